@@ -1,0 +1,10 @@
+//! Arms: their model, the traits that hardware and simulation share, the one loop that moves them, the limits with
+//! the last word, the guard, and the motions.
+//!
+//! It never hears of images or of files of scans.
+
+mod arm;
+mod joints;
+
+pub use arm::{Arm, ArmFault, Command, Controller, State};
+pub use joints::{Joints, MAX_JOINTS, WrongJoints};

@@ -1,0 +1,3 @@
+//! The command `probepath`.
+
+fn main() {}

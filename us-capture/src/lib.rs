@@ -1,0 +1,9 @@
+//! B-scans that know when they were formed and where the probe was: sources, tracked sequences, the exam file.
+//!
+//! It never hears of robots.
+
+mod bscan;
+mod source;
+
+pub use bscan::{BScan, BadBScan, PixelSpacing, PlacedBScan, Setting};
+pub use source::{BScanSource, SourceFault};

@@ -1,0 +1,35 @@
+//! Where B-scans come from.
+
+use probepath_frames::Stamp;
+use thiserror::Error;
+
+use crate::BScan;
+
+/// A stream of B-scans: the simulated machine, a sequence from disk, later a frame grabber or a network.
+pub trait BScanSource {
+    /// The next B-scan that has arrived by `now`, oldest first; `None` when there is none yet.
+    ///
+    /// # Errors
+    /// When the stream is broken: it ended, or what arrived is no B-scan.
+    fn poll(&mut self, now: Stamp) -> Result<Option<BScan>, SourceFault>;
+}
+
+/// Why a source has no more B-scans.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum SourceFault {
+    /// The connection is gone.
+    #[error("the ultrasound machine's connection was lost at {at}: {why}")]
+    ConnectionLost {
+        /// When it was noticed.
+        at: Stamp,
+        /// The cause, in words.
+        why: String,
+    },
+    /// A sequence from disk is over.
+    #[error("the sequence ended after {count} B-scans")]
+    Ended {
+        /// How many there were.
+        count: u64,
+    },
+}
