@@ -96,7 +96,8 @@ impl Joints {
 
     /// The largest absolute number, zero when there is none; NaN when any is NaN.
     pub fn largest(&self) -> f64 {
-        self.iter().fold(0.0, |most: f64, x| if x.is_nan() || most.is_nan() { f64::NAN } else { most.max(x.abs()) })
+        self.iter()
+            .fold(0.0, |most: f64, x| if x.is_nan() || most.is_nan() { f64::NAN } else { most.max(x.abs()) })
     }
 
     /// Whether every number is finite.

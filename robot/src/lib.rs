@@ -5,6 +5,7 @@
 
 mod arm;
 mod joints;
+pub mod motion;
 
 pub use arm::{Arm, ArmFault, Command, Controller, State};
 pub use joints::{Joints, MAX_JOINTS, WrongJoints};

@@ -1,0 +1,4 @@
+//! Motions: what a controller is made of.
+
+pub mod follow;
+pub mod spline;
