@@ -1,3 +1,3 @@
-//! The command `probepath`.
+//! The command `probepath`: it translates what was typed, and decides nothing.
 
 fn main() {}
