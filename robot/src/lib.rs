@@ -5,7 +5,12 @@
 
 mod arm;
 mod joints;
+mod model;
 pub mod motion;
 
 pub use arm::{Arm, ArmFault, Command, Controller, State};
 pub use joints::{Joints, MAX_JOINTS, WrongJoints};
+pub use model::{
+    InverseOptions, Jacobian, JointLimit, Mesh, Model, ModelError, ModelWarning, NoInverse, PANDA_URDF,
+    UR5E_URDF, Value, Vector6, manipulability,
+};

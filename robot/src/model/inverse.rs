@@ -1,0 +1,333 @@
+//! Inverse kinematics: joints for a pose, within limits, near a reference posture; or why there are none.
+
+use std::f64::consts::{PI, TAU};
+
+use nalgebra::{Isometry3, Matrix3};
+use probepath_frames::{Base, Flange, Frame, Pose};
+use thiserror::Error;
+
+use super::newton::{LIMIT_SLACK, within};
+use super::solve::{least_step, missing};
+use super::{Model, Vector6};
+use crate::Joints;
+
+/// How hard to look.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InverseOptions {
+    /// Steps from each posture that is tried.
+    pub steps: usize,
+    /// Postures that are tried after the reference, spread evenly over the joints' ranges, always the same ones.
+    pub restarts: usize,
+    /// Restarts end when so many solutions were found; the one nearest to the reference is taken.
+    pub enough: usize,
+}
+
+impl Default for InverseOptions {
+    fn default() -> Self {
+        Self { steps: 100, restarts: 60, enough: 4 }
+    }
+}
+
+/// Why no joints put the tool there.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum NoInverse {
+    /// The reference has another number of joints than the model.
+    #[error("the reference posture has {found} joints and the arm {expected}; give one position per joint")]
+    WrongJoints {
+        /// In the reference.
+        found: usize,
+        /// In the model.
+        expected: usize,
+    },
+    /// A number that is not finite came in.
+    #[error("{what} is not finite; check the numbers that were given")]
+    NotFinite {
+        /// Which input.
+        what: &'static str,
+    },
+    /// No posture reaches it, whatever the limits.
+    #[error(
+        "out of reach: the nearest posture found is {:.1} mm and {:.1} degrees short; bring the pose nearer to the base",
+        short_m * 1000.0, short_rad.to_degrees()
+    )]
+    OutOfReach {
+        /// Distance from the pose's origin to the nearest that was reached (m).
+        short_m: f64,
+        /// Angle there (rad).
+        short_rad: f64,
+    },
+    /// Postures reach it, and each that was found is outside the limits of a joint.
+    #[error(
+        "joint \"{joint}\" would have to be at {needed:.4} and may be at {lower:.4} to {upper:.4} (rad or m); \
+         move the pose or the base, or turn the tool"
+    )]
+    BeyondLimit {
+        /// The joint that is furthest outside, in the posture that is the least outside.
+        joint: String,
+        /// Where it would have to be.
+        needed: f64,
+        /// Its lower limit.
+        lower: f64,
+        /// Its upper limit.
+        upper: f64,
+    },
+    /// The arm gets near and there loses a direction it would need.
+    #[error(
+        "singular: {:.3} mm and {:.3} degrees short the arm cannot move as it would have to \
+         (smallest singular value {smallest:.1e}); move the pose away from there",
+        short_m * 1000.0, short_rad.to_degrees()
+    )]
+    Singular {
+        /// Distance that is left (m).
+        short_m: f64,
+        /// Angle that is left (rad).
+        short_rad: f64,
+        /// The smallest singular value of the Jacobian there.
+        smallest: f64,
+    },
+}
+
+/// A pose counts as reached here before Newton's last steps make it exact.
+const NEARLY: f64 = 1e-7;
+
+/// Nearer than this (m, rad) to a pose at a singular posture, the singularity is named and not the distance.
+const CLOSE: f64 = 5e-3;
+
+/// Below this smallest singular value an arm is at a singularity.
+const SINGULAR: f64 = 1e-2;
+
+/// The longest step of a joint (rad, m) in one iteration: beyond it the Jacobian says nothing.
+const LONGEST_STEP: f64 = 0.5;
+
+/// How much of the way back to the reference is gone in one step, where that moves the tool by nothing.
+const PULL: f64 = 0.5;
+
+/// Where a search ended.
+struct Found {
+    joints: Joints,
+    /// What is missing to the pose there.
+    motion: Vector6,
+}
+
+/// One question, and what it is measured against.
+struct Search<'a> {
+    model: &'a Model,
+    goal: Isometry3<f64>,
+    goal_rotation: Matrix3<f64>,
+    tool: Isometry3<f64>,
+    reference: Joints,
+    options: InverseOptions,
+}
+
+impl Model {
+    /// Joints that put the tool at `base_from_tool` to 1e-12, within the limits; among those that were found the
+    /// nearest to `reference`. The same question gives the same answer.
+    ///
+    /// Damped least squares with the damping of Sugihara (2011), which goes with the error and so is as quick as
+    /// Newton at the end and steady where there is no solution; joints at a limit are held there, and what freedom
+    /// is left pulls to the reference.
+    ///
+    /// # Errors
+    /// When nothing was found: out of reach and by how much, which joint's limit is in the way, or singular.
+    pub fn inverse<T: Frame>(
+        &self,
+        base_from_tool: &Pose<Base, T>,
+        flange_from_tool: &Pose<Flange, T>,
+        reference: &Joints,
+        options: &InverseOptions,
+    ) -> Result<Joints, NoInverse> {
+        if reference.len() != self.joints() {
+            return Err(NoInverse::WrongJoints { found: reference.len(), expected: self.joints() });
+        }
+        refuse_infinite("the pose", base_from_tool.is_finite())?;
+        refuse_infinite("the tool", flange_from_tool.is_finite())?;
+        refuse_infinite("the reference posture", reference.is_finite())?;
+        let goal = *base_from_tool.isometry();
+        let search = Search {
+            model: self,
+            goal,
+            goal_rotation: goal.rotation.to_rotation_matrix().into_inner(),
+            tool: *flange_from_tool.isometry(),
+            reference: *reference,
+            options: *options,
+        };
+        search.nearest().ok_or_else(|| search.why())
+    }
+}
+
+fn refuse_infinite(what: &'static str, finite: bool) -> Result<(), NoInverse> {
+    if finite { Ok(()) } else { Err(NoInverse::NotFinite { what }) }
+}
+
+impl Search<'_> {
+    /// From the reference; when that fails, from the other postures.
+    fn nearest(&self) -> Option<Joints> {
+        if let Some(joints) = self.solve(&self.reference) {
+            return Some(joints);
+        }
+        let distance = |q: &Joints| q.zip(&self.reference, |a, b| (a - b) * (a - b)).iter().sum::<f64>();
+        (1..=self.options.restarts)
+            .filter_map(|number| self.solve(&self.spread(number)))
+            .take(self.options.enough)
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    }
+
+    /// A solution within limits, from one posture.
+    fn solve(&self, start: &Joints) -> Option<Joints> {
+        let found = self.descend(start, true);
+        if !within(&found.motion, NEARLY) {
+            return None;
+        }
+        let exact = self.model.newton(&self.goal, &self.tool, &found.joints, 6)?;
+        let exact = self.unwound(&exact);
+        self.model.outside_limits(&exact, LIMIT_SLACK).is_none().then_some(exact)
+    }
+
+    /// Goes downhill from a posture until the pose is reached and the pull to the reference has come to rest, or the
+    /// steps are used up.
+    fn descend(&self, start: &Joints, limited: bool) -> Found {
+        let mut joints = if limited { self.clamped(start) } else { *start };
+        let mut motion = Vector6::repeat(f64::INFINITY);
+        for _ in 0..self.options.steps {
+            let reach = self.model.reach(&joints, &self.tool);
+            motion = missing(&reach, &self.goal, &self.goal_rotation);
+            let Some(step) = self.step(&reach.jacobian, &motion, &joints, limited) else { break };
+            if within(&motion, NEARLY) && (self.model.joints() <= 6 || step.largest() < 1e-4) {
+                break;
+            }
+            let shorter = (LONGEST_STEP / step.largest()).min(1.0);
+            joints = joints.zip(&step, |q, step| q + step * shorter);
+            if limited {
+                joints = self.clamped(&joints);
+            }
+        }
+        Found { joints, motion }
+    }
+
+    /// One damped step; a joint that it would push out of its range is held and the rest is solved again.
+    fn step(
+        &self,
+        jacobian: &super::Jacobian,
+        motion: &Vector6,
+        joints: &Joints,
+        limited: bool,
+    ) -> Option<Joints> {
+        let damping = 0.5 * motion.norm_squared() + 1e-10;
+        let mut free = *jacobian;
+        let mut pull = self.pull(joints);
+        for _ in 0..=joints.len() {
+            // The step nearest to the pull among those that move the tool as asked.
+            let rest = motion - free.velocity(&pull);
+            let step = least_step(&free, &rest, damping)?.zip(&pull, |step, pull| step + pull);
+            let pushed = if limited { self.pushed_out(joints, &step, &free) } else { None };
+            let Some(held) = pushed else { return Some(step) };
+            free.matrix.column_mut(held).fill(0.0);
+            pull[held] = 0.0;
+        }
+        Some(Joints::zeros(joints.len()))
+    }
+
+    fn pull(&self, joints: &Joints) -> Joints {
+        if joints.len() <= 6 {
+            return Joints::zeros(joints.len());
+        }
+        self.reference.zip(joints, |reference, q| PULL * (reference - q))
+    }
+
+    /// A joint at its limit that the step would push further, and that is not held yet.
+    fn pushed_out(&self, joints: &Joints, step: &Joints, free: &super::Jacobian) -> Option<usize> {
+        (0..joints.len()).find(|&j| {
+            let limit = &self.model.limits[j];
+            let out =
+                (joints[j] <= limit.lower && step[j] < 0.0) || (joints[j] >= limit.upper && step[j] > 0.0);
+            out && free.matrix.column(j).amax() > 0.0
+        })
+    }
+
+    fn clamped(&self, joints: &Joints) -> Joints {
+        let mut all = *joints;
+        for (q, limit) in all.as_mut_slice().iter_mut().zip(&self.model.limits) {
+            *q = q.max(limit.lower).min(limit.upper);
+        }
+        all
+    }
+
+    /// Whole turns taken off, as near to the reference as the limits allow.
+    fn unwound(&self, joints: &Joints) -> Joints {
+        let mut all = *joints;
+        for (j, q) in all.as_mut_slice().iter_mut().enumerate() {
+            if !self.model.turns_freely(j) {
+                continue;
+            }
+            let limit = &self.model.limits[j];
+            let nearest = *q - ((*q - self.reference[j]) / TAU).round() * TAU;
+            let lift = ((limit.lower - LIMIT_SLACK - nearest) / TAU).ceil().max(0.0) * TAU;
+            let lowered = ((nearest - limit.upper - LIMIT_SLACK) / TAU).ceil().max(0.0) * TAU;
+            *q = nearest + lift - lowered;
+        }
+        all
+    }
+
+    /// Posture `number` of a sequence that fills the joints' ranges evenly (Halton, one prime a joint).
+    fn spread(&self, number: usize) -> Joints {
+        let mut all = self.reference;
+        for ((q, limit), prime) in all.as_mut_slice().iter_mut().zip(&self.model.limits).zip(PRIMES) {
+            let (lower, upper) = (limit.lower.max(-PI), limit.upper.min(PI));
+            let (lower, upper) = if lower < upper { (lower, upper) } else { (limit.lower, limit.upper) };
+            *q = lower + (upper - lower) * radical_inverse(number, prime);
+        }
+        all
+    }
+
+    /// After every posture failed: the cause, looked for again without the limits.
+    fn why(&self) -> NoInverse {
+        let starts = (0..=self.options.restarts.min(12))
+            .map(|number| if number == 0 { self.reference } else { self.spread(number) });
+        let found: Vec<_> = starts.map(|start| self.descend(&start, false)).collect();
+        let solved = found.iter().filter(|found| within(&found.motion, NEARLY));
+        let beyond = solved.filter_map(|found| self.furthest_out(&self.unwound(&found.joints)));
+        if let Some((joint, needed, _)) = beyond.min_by(|a, b| a.2.total_cmp(&b.2)) {
+            let limit = &self.model.limits[joint];
+            let name = self.model.names.get(joint).cloned().unwrap_or_default();
+            return NoInverse::BeyondLimit { joint: name, needed, lower: limit.lower, upper: limit.upper };
+        }
+        self.short(&found)
+    }
+
+    /// The joint that is furthest outside, where it is, and by how much.
+    fn furthest_out(&self, joints: &Joints) -> Option<(usize, f64, f64)> {
+        let out = joints
+            .iter()
+            .zip(&self.model.limits)
+            .map(|(q, limit)| (q, (limit.lower - q).max(q - limit.upper)));
+        out.enumerate().map(|(j, (q, by))| (j, q, by)).max_by(|a, b| a.2.total_cmp(&b.2))
+    }
+
+    fn short(&self, found: &[Found]) -> NoInverse {
+        let nearest = found.iter().min_by(|a, b| a.motion.norm().total_cmp(&b.motion.norm()));
+        let (short_m, short_rad, smallest) = nearest.map_or((f64::NAN, f64::NAN, f64::NAN), |found| {
+            let reach = self.model.reach(&found.joints, &self.tool);
+            let (linear, angular) =
+                (found.motion.fixed_rows::<3>(0).norm(), found.motion.fixed_rows::<3>(3).norm());
+            (linear, angular, reach.jacobian.smallest_singular_value())
+        });
+        if short_m < CLOSE && short_rad < CLOSE && smallest < SINGULAR {
+            return NoInverse::Singular { short_m, short_rad, smallest };
+        }
+        NoInverse::OutOfReach { short_m, short_rad }
+    }
+}
+
+const PRIMES: [usize; crate::MAX_JOINTS] = [2, 3, 5, 7, 11, 13, 17, 19];
+
+/// The digits of `number` in base `prime`, mirrored at the point.
+fn radical_inverse(mut number: usize, prime: usize) -> f64 {
+    let (mut value, mut digit) = (0.0, 1.0);
+    while number > 0 {
+        digit /= prime as f64;
+        value += digit * (number % prime) as f64;
+        number /= prime;
+    }
+    value
+}
