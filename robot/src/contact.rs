@@ -1,0 +1,181 @@
+//! [`ContactLaw`]: holds the force along the probe's z by moving the probe along it.
+//!
+//! Pressing force in, offset along the probe's z out (positive into the tissue), every output jerk-limited.
+
+use probepath_frames::Span;
+use thiserror::Error;
+
+use crate::limits::axis::{self, Bounds, Motion};
+
+/// What the contact law may do, and how it does it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactSettings {
+    /// Largest speed along the probe's z (m/s). 0.03.
+    pub speed_m_s: f64,
+    /// Largest acceleration along it (m/s²). 0.5.
+    pub acceleration_m_s2: f64,
+    /// Largest jerk along it (m/s³). 15.
+    pub jerk_m_s3: f64,
+    /// How far the offset may go against the path, out of the tissue (m, negative). -0.03.
+    pub lowest_m: f64,
+    /// How far the offset may go into the tissue (m). 0.03.
+    pub highest_m: f64,
+    /// Speed for each newton that is missing (m/s/N). 0.008.
+    pub gain: f64,
+    /// Acceleration for each newton that is missing (m/s²/N): follows a skin that rises steadily. 0.04.
+    pub integral_gain: f64,
+    /// Time constant of the filter on the force (s). 0.005.
+    pub filter_s: f64,
+    /// Angular frequency of the second-order filter on the speed (rad/s). 125.
+    pub smooth_rad_s: f64,
+}
+
+impl Default for ContactSettings {
+    fn default() -> Self {
+        Self {
+            speed_m_s: 0.03,
+            acceleration_m_s2: 0.5,
+            jerk_m_s3: 15.0,
+            lowest_m: -0.03,
+            highest_m: 0.03,
+            gain: 0.008,
+            integral_gain: 0.04,
+            filter_s: 0.005,
+            smooth_rad_s: 125.0,
+        }
+    }
+}
+
+/// Settings that no contact can be held with.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[error("the contact setting {what} is {value}; {wanted}")]
+pub struct ContactError {
+    /// Which setting.
+    pub what: &'static str,
+    /// The number found.
+    pub value: f64,
+    /// What it has to be.
+    pub wanted: &'static str,
+}
+
+/// Force in, offset out.
+#[derive(Clone, Copy, Debug)]
+pub struct ContactLaw {
+    settings: ContactSettings,
+    bounds: Bounds,
+    dt: f64,
+    /// The offset and its differences, per tick.
+    motion: Motion,
+    /// The filtered pressing force (N), once one has come.
+    force: Option<f64>,
+    /// The integral's share of the speed (m/s).
+    integral: f64,
+}
+
+impl ContactLaw {
+    /// At rest at offset zero.
+    ///
+    /// # Errors
+    /// When a setting is not finite or has the wrong sign.
+    pub fn new(settings: ContactSettings, period: Span) -> Result<Self, ContactError> {
+        let dt = period.seconds();
+        let s = &settings;
+        let positive = [
+            ("speed", s.speed_m_s),
+            ("acceleration", s.acceleration_m_s2),
+            ("jerk", s.jerk_m_s3),
+            ("highest offset", s.highest_m),
+            ("lowest offset, negated", -s.lowest_m),
+            ("gain", s.gain),
+            ("integral gain", s.integral_gain),
+            ("filter", s.filter_s),
+            ("smoothing", s.smooth_rad_s),
+            ("period", dt),
+        ];
+        if let Some((what, value)) =
+            positive.into_iter().find(|(_, value)| !(value.is_finite() && *value > 0.0))
+        {
+            return Err(ContactError { what, value, wanted: "it must be positive and finite" });
+        }
+        let bounds = Bounds {
+            lower: s.lowest_m,
+            upper: s.highest_m,
+            velocity: s.speed_m_s * dt,
+            acceleration: s.acceleration_m_s2 * dt * dt,
+            jerk: s.jerk_m_s3 * dt * dt * dt,
+        };
+        let motion = Motion { position: 0.0, velocity: 0.0, acceleration: 0.0 };
+        Ok(Self { settings, bounds, dt, motion, force: None, integral: 0.0 })
+    }
+
+    /// One tick: the pressing force (N, positive; minus the wrench's force along the probe's z) and the force to hold
+    /// give the next offset (m). A force that is not finite counts as the one before.
+    pub fn step(&mut self, pressing_n: f64, set_n: f64) -> f64 {
+        let missing = set_n - self.filtered(pressing_n);
+        let wanted = self.settings.gain * missing + self.integral;
+        self.follow(wanted);
+        self.integrate(missing, wanted);
+        self.motion.position
+    }
+
+    /// One tick at a given speed (m/s, positive into the tissue) instead of a force, as smoothly: the descent before
+    /// contact, the lift after.
+    pub fn step_at(&mut self, speed_m_s: f64, pressing_n: f64) -> f64 {
+        self.filtered(pressing_n);
+        self.integral = speed_m_s;
+        self.follow(speed_m_s);
+        self.motion.position
+    }
+
+    /// The offset now (m).
+    pub const fn offset_m(&self) -> f64 {
+        self.motion.position
+    }
+
+    /// The offset's speed now (m/s).
+    pub fn speed_m_s(&self) -> f64 {
+        self.motion.velocity / self.dt
+    }
+
+    /// The pressing force it believes (N), filtered.
+    pub fn force_n(&self) -> f64 {
+        self.force.unwrap_or(0.0)
+    }
+
+    /// What it may do.
+    pub const fn settings(&self) -> &ContactSettings {
+        &self.settings
+    }
+
+    fn filtered(&mut self, pressing_n: f64) -> f64 {
+        let before = self.force.unwrap_or(if pressing_n.is_finite() { pressing_n } else { 0.0 });
+        let share = self.dt / (self.settings.filter_s + self.dt);
+        let force = if pressing_n.is_finite() { before + share * (pressing_n - before) } else { before };
+        self.force = Some(force);
+        force
+    }
+
+    /// Moves toward a speed, as a critically damped filter of second order does, within the bounds.
+    fn follow(&mut self, speed_m_s: f64) {
+        let w = self.settings.smooth_rad_s * self.dt;
+        let speed = speed_m_s.clamp(-self.settings.speed_m_s, self.settings.speed_m_s) * self.dt;
+        let m = &self.motion;
+        // Solved for the end of the tick, so that it is stable at any frequency.
+        let acceleration = (m.acceleration + w * w * (speed - m.velocity)) / (1.0 + 2.0 * w + w * w);
+        let wanted = m.position + (m.velocity + acceleration);
+        let position = axis::limit(m, &self.bounds, wanted);
+        let velocity = position - m.position;
+        self.motion = Motion { position, velocity, acceleration: velocity - m.velocity };
+    }
+
+    /// The integral stops where the speed or the offset is at its limit, unless it leads back.
+    fn integrate(&mut self, missing: f64, wanted: f64) {
+        let s = &self.settings;
+        let full = wanted.abs() >= s.speed_m_s
+            || (wanted > 0.0 && self.motion.position > s.highest_m - 1e-4)
+            || (wanted < 0.0 && self.motion.position < s.lowest_m + 1e-4);
+        if !full || missing * wanted < 0.0 {
+            self.integral += s.integral_gain * missing * self.dt;
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! [`Tick`]: what happened at one tick, and [`Observer`]: who wants to know.
+
+use crate::{Command, State, Verdict};
+
+/// One tick of the loop: what was wanted, what was sent, and what came back.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tick {
+    /// Ticks since this motion began.
+    pub index: u64,
+    /// What the controller wanted, before the limits.
+    pub wanted: Command,
+    /// What was sent.
+    pub command: Command,
+    /// How far the limits changed the joint they changed most (rad, m).
+    pub changed: f64,
+    /// The state that came back.
+    pub state: State,
+    /// What the guard made of it.
+    pub verdict: Verdict,
+    /// Whether the loop is braking, whatever the controller wants.
+    pub braking: bool,
+}
+
+/// What an observer wants.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Wish {
+    /// Go on.
+    GoOn,
+    /// Stop the arm, and say why.
+    Stop(String),
+}
+
+/// Sees every tick, brakes included: a recorder, a screen, a watch on the images. It must be quick and touch no heap
+/// on the way (bounded queues), because the arm waits for it.
+pub trait Observer {
+    /// One tick.
+    fn tick(&mut self, tick: &Tick) -> Wish;
+}
+
+/// Nobody watches.
+impl Observer for () {
+    fn tick(&mut self, _: &Tick) -> Wish {
+        Wish::GoOn
+    }
+}
+
+/// A function watches.
+impl<F: FnMut(&Tick) -> Wish> Observer for F {
+    fn tick(&mut self, tick: &Tick) -> Wish {
+        self(tick)
+    }
+}

@@ -1,0 +1,263 @@
+//! The one loop that runs a controller on an arm.
+
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use thiserror::Error;
+
+use crate::{
+    Arm, ArmFault, BlackBox, Command, Controller, Guard, Limiter, LimitsError, Observer, State, Tick, Trip,
+    Verdict, Wish,
+};
+
+/// A motion that ended in peace, the arm at rest.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finished {
+    /// Who ended it.
+    pub ending: Ending,
+    /// How many ticks it took, the brake included.
+    pub ticks: u64,
+    /// The last state, at rest.
+    pub last: State,
+}
+
+/// Who ended a motion in peace.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Ending {
+    /// The controller: it was done.
+    Done,
+    /// The operator's stop.
+    Operator,
+    /// The observer, with its reason.
+    Observer(String),
+}
+
+/// A motion that was stopped by a fault.
+#[derive(Clone, Debug, Error)]
+#[error("the motion was stopped after {} ticks: {reason}", black_box.seen())]
+pub struct RunError {
+    /// Why.
+    #[source]
+    pub reason: StopReason,
+    /// The last state that came, if any.
+    pub last: Option<State>,
+    /// Whether the loop saw the arm's commanded positions come to rest; if not, the arm braked by its own means.
+    pub at_rest: bool,
+    /// The last ticks, newest last.
+    pub black_box: BlackBox,
+}
+
+/// Why a motion was stopped.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum StopReason {
+    /// The guard.
+    #[error("{0}")]
+    Guard(Trip),
+    /// The arm.
+    #[error("{0}")]
+    Arm(ArmFault),
+    /// A command that the limits refuse, or limits that do not fit the arm.
+    #[error("{0}")]
+    Limits(LimitsError),
+    /// A bug in the controller or the observer.
+    #[error("the {who} panicked: {message}; this is a bug, please report it with the black box")]
+    Panicked {
+        /// Who.
+        who: &'static str,
+        /// What it said.
+        message: String,
+    },
+    /// The arm was still moving when the motion was to begin.
+    #[error("the arm does not come to rest; nothing was commanded")]
+    Restless,
+}
+
+impl StopReason {
+    /// Whether the probe should be lifted off before anything else.
+    pub const fn asks_to_lift(&self) -> bool {
+        matches!(self, Self::Guard(trip) if trip.asks_to_lift())
+    }
+}
+
+/// How many ticks an arm gets to come to rest before a motion begins.
+const TICKS_TO_REST: usize = 5000;
+
+/// Runs a controller on an arm until the controller ends, the operator or the observer asks to stop, or a fault.
+/// Whatever door the loop is left by, the arm is braked to rest within its limits through the same exchange, and
+/// then told to stay; an arm that does not answer is told to stay, and brakes by its own means.
+///
+/// After the controller come the limits with the last word, then the guard; see [`Limiter`] and [`Guard`].
+///
+/// # Errors
+/// When the guard trips, the arm fails, a command is not finite, or the controller or observer panics; the error
+/// carries the last ticks. After an error the guard wants a fresh confirmation.
+pub fn run(
+    arm: &mut dyn Arm,
+    controller: &mut dyn Controller,
+    guard: &mut Guard,
+    observer: &mut dyn Observer,
+) -> Result<Finished, Box<RunError>> {
+    let mut motion = Motion::begin(arm, guard, observer)?;
+    let left = motion.go_on(controller);
+    motion.end(left)
+}
+
+/// How the loop was left.
+type Left = Result<Ending, StopReason>;
+
+/// A motion under way.
+struct Motion<'a> {
+    arm: &'a mut dyn Arm,
+    guard: &'a mut Guard,
+    observer: &'a mut dyn Observer,
+    limiter: Limiter,
+    black_box: BlackBox,
+    state: State,
+    dt: f64,
+    ticks: u64,
+    /// Whether the observer may still be asked: after a panic it is left alone.
+    observer_well: bool,
+}
+
+impl<'a> Motion<'a> {
+    fn begin(
+        arm: &'a mut dyn Arm,
+        guard: &'a mut Guard,
+        observer: &'a mut dyn Observer,
+    ) -> Result<Self, Box<RunError>> {
+        let black_box = BlackBox::default();
+        let refused = |reason, last| RunError { reason, last, at_rest: true, black_box: BlackBox::new(1) };
+        let state = rest(arm).map_err(|reason| Box::new(refused(reason, None)))?;
+        guard.begin(&state).map_err(|trip| Box::new(refused(StopReason::Guard(trip), Some(state))))?;
+        let (dt, limits) = (arm.period().seconds(), *guard.motion_limits());
+        let limiter = Limiter::at_rest(limits, arm.period(), state.commanded).map_err(|error| {
+            guard.end();
+            Box::new(refused(StopReason::Limits(error), Some(state)))
+        })?;
+        Ok(Self { arm, guard, observer, limiter, black_box, state, dt, ticks: 0, observer_well: true })
+    }
+
+    /// The loop.
+    fn go_on(&mut self, controller: &mut dyn Controller) -> Left {
+        loop {
+            if self.guard.is_stop_asked() {
+                return Ok(Ending::Operator);
+            }
+            let Some(wanted) = caught("controller", || controller.step(&self.state))? else {
+                return Ok(Ending::Done);
+            };
+            let (command, changed) = self.limited(&wanted)?;
+            if let Wish::Stop(why) = self.exchange(wanted, command, changed, false)? {
+                return Ok(Ending::Observer(why));
+            }
+        }
+    }
+
+    /// The command after the limits and the guard.
+    fn limited(&mut self, wanted: &Command) -> Result<(Command, f64), StopReason> {
+        let Command::Position(position) = wanted else {
+            return Ok((Command::Position(self.limiter.brake()), 0.0));
+        };
+        let before = self.limiter;
+        let limited = self.limiter.limit(position).map_err(StopReason::Limits)?;
+        match self.guard.judge_command(&limited.position, limited.changed, limited.joint, self.dt) {
+            Verdict::Stop(trip) => {
+                // It is not sent, so the brake starts from what was sent last.
+                self.limiter = before;
+                Err(StopReason::Guard(trip))
+            }
+            _ => Ok((Command::Position(limited.position), limited.changed)),
+        }
+    }
+
+    /// One tick: out goes the command, back comes the state, and everybody who watches is told.
+    fn exchange(
+        &mut self,
+        wanted: Command,
+        command: Command,
+        changed: f64,
+        braking: bool,
+    ) -> Result<Wish, StopReason> {
+        self.state = self.arm.exchange(&command).map_err(StopReason::Arm)?;
+        let verdict = if braking { Verdict::Fine } else { self.guard.judge(&self.state, self.dt) };
+        let tick = Tick { index: self.ticks, wanted, command, changed, state: self.state, verdict, braking };
+        self.ticks += 1;
+        self.black_box.push(&tick);
+        let wish = self.tell(&tick)?;
+        match verdict {
+            Verdict::Stop(trip) => Err(StopReason::Guard(trip)),
+            _ => Ok(wish),
+        }
+    }
+
+    fn tell(&mut self, tick: &Tick) -> Result<Wish, StopReason> {
+        if !self.observer_well {
+            return Ok(Wish::GoOn);
+        }
+        let told = caught("observer", || self.observer.tick(tick));
+        self.observer_well = told.is_ok();
+        told
+    }
+
+    /// Brakes, tells the arm to stay, and says how it went.
+    fn end(mut self, left: Left) -> Result<Finished, Box<RunError>> {
+        let braked = match &left {
+            Err(StopReason::Arm(_)) => Ok(()),
+            _ => self.brake(),
+        };
+        let at_rest = braked.is_ok() && self.limiter.is_at_rest() && !matches!(left, Err(StopReason::Arm(_)));
+        // The last word, also to an arm that did not answer: it may hear without being able to speak.
+        let stayed = self.arm.exchange(&Command::Stay);
+        let reason = match (left, braked, stayed) {
+            (Err(reason), _, _) | (Ok(_), Err(reason), _) => reason,
+            (Ok(ending), Ok(()), Ok(last)) => {
+                self.guard.end();
+                return Ok(Finished { ending, ticks: self.ticks, last });
+            }
+            (Ok(_), Ok(()), Err(fault)) => StopReason::Arm(fault),
+        };
+        self.guard.stop(if let StopReason::Guard(trip) = reason { trip } else { Trip::Fault });
+        self.guard.end();
+        Err(Box::new(RunError { reason, last: Some(self.state), at_rest, black_box: self.black_box }))
+    }
+
+    /// To rest, as hard as the limits allow. The observer is told, and can no longer ask for anything.
+    fn brake(&mut self) -> Result<(), StopReason> {
+        while !self.limiter.is_at_rest() {
+            let command = Command::Position(self.limiter.brake());
+            match self.exchange(command, command, 0.0, true) {
+                Ok(_) | Err(StopReason::Panicked { .. }) => {}
+                Err(reason) => return Err(reason),
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Stays until the arm's commanded positions are the same for three ticks: from there the finite differences start.
+fn rest(arm: &mut dyn Arm) -> Result<State, StopReason> {
+    let mut state = arm.exchange(&Command::Stay).map_err(StopReason::Arm)?;
+    let mut same = 0;
+    for _ in 0..TICKS_TO_REST {
+        let next = arm.exchange(&Command::Stay).map_err(StopReason::Arm)?;
+        same = if next.commanded == state.commanded { same + 1 } else { 0 };
+        state = next;
+        if same == 2 {
+            return Ok(state);
+        }
+    }
+    Err(StopReason::Restless)
+}
+
+/// Calls somebody else's code, and turns its panic into a reason.
+fn caught<T>(who: &'static str, call: impl FnOnce() -> T) -> Result<T, StopReason> {
+    catch_unwind(AssertUnwindSafe(call))
+        .map_err(|panic| StopReason::Panicked { who, message: message(panic.as_ref()) })
+}
+
+/// What a panic said.
+fn message(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().copied();
+    text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("without words").into()
+}
