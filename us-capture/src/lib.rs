@@ -3,7 +3,10 @@
 //! It never hears of robots.
 
 mod bscan;
+mod calibration;
+pub mod exam;
 mod source;
 
 pub use bscan::{BScan, BadBScan, PixelSpacing, PlacedBScan, Setting};
+pub use calibration::{BadCalibration, Calibration, CalibrationError};
 pub use source::{BScanSource, SourceFault};
