@@ -5,6 +5,7 @@ pub mod follow;
 mod hold;
 mod point_to_point;
 pub mod spline;
+pub mod timing;
 
 pub use brake::Brake;
 pub use hold::Hold;
