@@ -148,15 +148,17 @@ fn narrowed(
     master: JointLimit,
 ) -> Result<JointLimit, ModelError> {
     let own = &joint.limit;
-    let given = own.lower != own.upper && own.lower.is_finite() && own.upper.is_finite();
-    if own.lower.is_nan() || own.upper.is_nan() || own.velocity.is_nan() {
-        return Err(tree.number(
-            joint,
-            "limit lower to upper",
-            Value::Range(own.lower, own.upper),
-            "write numbers",
-        ));
+    let range = Value::Range(own.lower, own.upper);
+    if own.velocity.is_nan() || own.velocity < 0.0 {
+        let fix = "write the highest speed (rad/s or m/s), above zero";
+        return Err(tree.number(joint, "limit velocity", Value::One(own.velocity), fix));
     }
+    if own.lower.is_nan() || own.upper.is_nan() || own.lower > own.upper {
+        let fix = "lower must not be above upper, and both must be numbers";
+        return Err(tree.number(joint, "limit lower to upper", range, fix));
+    }
+    // Left out, both read as zero: a mimic joint needs none.
+    let given = own.lower < own.upper;
     let mut limit = master;
     if given && drive.scale != 0.0 && joint.joint_type != JointType::Continuous {
         let (a, b) = ((own.lower - drive.offset) / drive.scale, (own.upper - drive.offset) / drive.scale);
@@ -169,7 +171,7 @@ fn narrowed(
         return Ok(limit);
     }
     let fix = "with its master's limits no position is left: correct either";
-    Err(tree.number(joint, "limit lower to upper", Value::Range(own.lower, own.upper), fix))
+    Err(tree.number(joint, "limit lower to upper", range, fix))
 }
 
 /// Folds fixed transforms into the moving joints, and turns each joint so that its axis is z.

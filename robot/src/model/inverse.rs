@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use super::newton::{LIMIT_SLACK, within};
 use super::solve::{least_step, missing};
-use super::{Model, Vector6};
+use super::{Jacobian, Model, Vector6};
 use crate::Joints;
 
 /// How hard to look.
@@ -88,8 +88,14 @@ pub enum NoInverse {
     },
 }
 
-/// A pose counts as reached here before Newton's last steps make it exact.
-const NEARLY: f64 = 1e-7;
+/// A pose is reached when neither its place (m) nor its angle (rad) is off by more.
+const REACHED: f64 = 1e-12;
+
+/// Keeps a step finite at a singularity; the square of a singular value (1e-5) that no arm should work at.
+const LEAST_DAMPING: f64 = 1e-10;
+
+/// A search whose steps are shorter than this (rad, m) has come to rest.
+const AT_REST: f64 = 1e-10;
 
 /// Nearer than this (m, rad) to a pose at a singular posture, the singularity is named and not the distance.
 const CLOSE: f64 = 5e-3;
@@ -102,6 +108,16 @@ const LONGEST_STEP: f64 = 0.5;
 
 /// How much of the way back to the reference is gone in one step, where that moves the tool by nothing.
 const PULL: f64 = 0.5;
+
+/// The pull has come to rest when steps are shorter than this (rad, m); nearer to the reference is not worth more.
+const SETTLED: f64 = 1e-6;
+
+/// Whether a search keeps to the joints' ranges.
+#[derive(Clone, Copy, PartialEq)]
+enum Within {
+    Limits,
+    Anything,
+}
 
 /// Where a search ended.
 struct Found {
@@ -166,77 +182,71 @@ impl Search<'_> {
         if let Some(joints) = self.solve(&self.reference) {
             return Some(joints);
         }
-        let distance = |q: &Joints| q.zip(&self.reference, |a, b| (a - b) * (a - b)).iter().sum::<f64>();
         (1..=self.options.restarts)
             .filter_map(|number| self.solve(&self.spread(number)))
             .take(self.options.enough)
-            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .min_by(|a, b| self.distance(a).total_cmp(&self.distance(b)))
     }
 
-    /// A solution within limits, from one posture.
+    /// A solution within limits, from one posture: first the pose by itself, then, with joints to spare, the pull to
+    /// the reference.
     fn solve(&self, start: &Joints) -> Option<Joints> {
-        let found = self.descend(start, true);
-        if !within(&found.motion, NEARLY) {
+        let found = self.descend(start, Within::Limits, 0.0);
+        if !within(&found.motion, REACHED) {
             return None;
         }
-        let exact = self.model.newton(&self.goal, &self.tool, &found.joints, 6)?;
-        let exact = self.unwound(&exact);
-        self.model.outside_limits(&exact, LIMIT_SLACK).is_none().then_some(exact)
+        let found = self.unwound(&found.joints);
+        let pulled = self.descend(&found, Within::Limits, PULL);
+        let better = within(&pulled.motion, REACHED) && self.distance(&pulled.joints) < self.distance(&found);
+        Some(if better { pulled.joints } else { found })
+    }
+
+    fn distance(&self, q: &Joints) -> f64 {
+        q.zip(&self.reference, |a, b| (a - b) * (a - b)).iter().sum()
     }
 
     /// Goes downhill from a posture until the pose is reached and the pull to the reference has come to rest, or the
-    /// steps are used up.
-    fn descend(&self, start: &Joints, limited: bool) -> Found {
-        let mut joints = if limited { self.clamped(start) } else { *start };
-        let mut motion = Vector6::repeat(f64::INFINITY);
+    /// search has, or the steps are used up.
+    fn descend(&self, start: &Joints, bounds: Within, pull: f64) -> Found {
+        let pull = if self.model.joints() > 6 { pull } else { 0.0 };
+        let mut found = Found { joints: self.clamped(start, bounds), motion: Vector6::repeat(f64::INFINITY) };
         for _ in 0..self.options.steps {
-            let reach = self.model.reach(&joints, &self.tool);
-            motion = missing(&reach, &self.goal, &self.goal_rotation);
-            let Some(step) = self.step(&reach.jacobian, &motion, &joints, limited) else { break };
-            if within(&motion, NEARLY) && (self.model.joints() <= 6 || step.largest() < 1e-4) {
+            let reach = self.model.reach(&found.joints, &self.tool);
+            found.motion = missing(&reach, &self.goal, &self.goal_rotation);
+            if pull <= 0.0 && within(&found.motion, REACHED) {
+                break;
+            }
+            let Some(step) = self.step(&reach.jacobian, &found, bounds, pull) else { break };
+            let rest = if within(&found.motion, REACHED) { SETTLED } else { AT_REST };
+            if step.largest() < rest {
                 break;
             }
             let shorter = (LONGEST_STEP / step.largest()).min(1.0);
-            joints = joints.zip(&step, |q, step| q + step * shorter);
-            if limited {
-                joints = self.clamped(&joints);
-            }
+            found.joints = self.clamped(&found.joints.zip(&step, |q, step| q + step * shorter), bounds);
         }
-        Found { joints, motion }
+        found
     }
 
     /// One damped step; a joint that it would push out of its range is held and the rest is solved again.
-    fn step(
-        &self,
-        jacobian: &super::Jacobian,
-        motion: &Vector6,
-        joints: &Joints,
-        limited: bool,
-    ) -> Option<Joints> {
-        let damping = 0.5 * motion.norm_squared() + 1e-10;
+    fn step(&self, jacobian: &Jacobian, found: &Found, bounds: Within, pull: f64) -> Option<Joints> {
+        let damping = 0.5 * found.motion.norm_squared() + LEAST_DAMPING;
         let mut free = *jacobian;
-        let mut pull = self.pull(joints);
-        for _ in 0..=joints.len() {
+        let mut pull = self.reference.zip(&found.joints, |reference, q| pull * (reference - q));
+        for _ in 0..=found.joints.len() {
             // The step nearest to the pull among those that move the tool as asked.
-            let rest = motion - free.velocity(&pull);
+            let rest = found.motion - free.velocity(&pull);
             let step = least_step(&free, &rest, damping)?.zip(&pull, |step, pull| step + pull);
-            let pushed = if limited { self.pushed_out(joints, &step, &free) } else { None };
+            let pushed =
+                if bounds == Within::Limits { self.pushed_out(&found.joints, &step, &free) } else { None };
             let Some(held) = pushed else { return Some(step) };
             free.matrix.column_mut(held).fill(0.0);
             pull[held] = 0.0;
         }
-        Some(Joints::zeros(joints.len()))
-    }
-
-    fn pull(&self, joints: &Joints) -> Joints {
-        if joints.len() <= 6 {
-            return Joints::zeros(joints.len());
-        }
-        self.reference.zip(joints, |reference, q| PULL * (reference - q))
+        Some(Joints::zeros(found.joints.len()))
     }
 
     /// A joint at its limit that the step would push further, and that is not held yet.
-    fn pushed_out(&self, joints: &Joints, step: &Joints, free: &super::Jacobian) -> Option<usize> {
+    fn pushed_out(&self, joints: &Joints, step: &Joints, free: &Jacobian) -> Option<usize> {
         (0..joints.len()).find(|&j| {
             let limit = &self.model.limits[j];
             let out =
@@ -245,8 +255,11 @@ impl Search<'_> {
         })
     }
 
-    fn clamped(&self, joints: &Joints) -> Joints {
+    fn clamped(&self, joints: &Joints, bounds: Within) -> Joints {
         let mut all = *joints;
+        if bounds == Within::Anything {
+            return all;
+        }
         for (q, limit) in all.as_mut_slice().iter_mut().zip(&self.model.limits) {
             *q = q.max(limit.lower).min(limit.upper);
         }
@@ -284,8 +297,8 @@ impl Search<'_> {
     fn why(&self) -> NoInverse {
         let starts = (0..=self.options.restarts.min(12))
             .map(|number| if number == 0 { self.reference } else { self.spread(number) });
-        let found: Vec<_> = starts.map(|start| self.descend(&start, false)).collect();
-        let solved = found.iter().filter(|found| within(&found.motion, NEARLY));
+        let found: Vec<_> = starts.map(|start| self.descend(&start, Within::Anything, 0.0)).collect();
+        let solved = found.iter().filter(|found| within(&found.motion, REACHED));
         let beyond = solved.filter_map(|found| self.furthest_out(&self.unwound(&found.joints)));
         if let Some((joint, needed, _)) = beyond.min_by(|a, b| a.2.total_cmp(&b.2)) {
             let limit = &self.model.limits[joint];

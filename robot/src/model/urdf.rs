@@ -258,7 +258,7 @@ impl<'a> Tree<'a> {
                 "lower must not be above upper: swap them",
             ));
         }
-        if lower == upper {
+        if upper <= lower {
             let fix = "write both limits (a missing one reads as 0), or make the joint fixed";
             return Err(self.number(joint, "limit lower to upper", range, fix));
         }
