@@ -10,6 +10,7 @@ mod newton;
 mod solve;
 #[cfg(test)]
 mod tests;
+mod text;
 mod urdf;
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, SMatrix, Translation3, UnitQuaternion, Vector3};

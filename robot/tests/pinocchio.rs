@@ -1,5 +1,12 @@
 //! Forward kinematics and Jacobians against Pinocchio's: files made by `tests/golden/make_kinematics.py`.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::print_stdout,
+    reason = "a test's own helpers may stop at the first surprise, and say what they measured"
+)]
+
 use std::path::{Path, PathBuf};
 
 use probepath_frames::{Flange, Pose};

@@ -9,11 +9,7 @@ use std::path::Path;
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use urdf_rs::{Joint, JointType, Robot};
 
-use super::{JointLimit, Model, ModelError, ModelWarning, Value, chain, mesh};
-
-/// Elements of a URDF nest five deep; the XML reader recurses, so a file made to nest without end would take the
-/// stack with it.
-const MAX_DEPTH: usize = 64;
+use super::{JointLimit, Model, ModelError, ModelWarning, Value, chain, mesh, text};
 
 /// An arm is metres long: a kilometre is a wrong unit or a damaged number.
 const MAX_LENGTH_M: f64 = 1000.0;
@@ -60,39 +56,14 @@ impl Model {
 
 fn parse(text: &str, source: &str) -> Result<Robot, ModelError> {
     let not_urdf = |why: String| ModelError::NotUrdf { file: source.into(), why };
-    if depth(text) > MAX_DEPTH {
-        return Err(not_urdf(format!("elements are nested more than {MAX_DEPTH} deep")));
-    }
+    // Editors of one large system begin a text file with this mark; it is no part of the XML.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    text::check(text).map_err(not_urdf)?;
     let robot = urdf_rs::read_from_string(text).map_err(|cause| not_urdf(cause.to_string()))?;
     if robot.links.is_empty() {
         return Err(not_urdf("it has no link".into()));
     }
     Ok(robot)
-}
-
-/// How deep the elements nest, or more: comments and quoted marks are not looked through, every `<name` counts until
-/// a `</` or `/>`.
-fn depth(text: &str) -> usize {
-    let (mut now, mut most) = (0_usize, 0);
-    let mut rest = text;
-    while let Some(at) = rest.find(['<', '/']) {
-        rest = &rest[at..];
-        if let Some(comment) = rest.strip_prefix("<!--") {
-            rest = comment.split_once("-->").map_or("", |(_, after)| after);
-            continue;
-        }
-        if rest.starts_with("</") || rest.starts_with("/>") {
-            now = now.saturating_sub(1);
-            rest = &rest[2..];
-            continue;
-        }
-        if rest.starts_with('<') && !rest.starts_with("<?") && !rest.starts_with("<!") {
-            now += 1;
-            most = most.max(now);
-        }
-        rest = &rest[1..];
-    }
-    most
 }
 
 fn left_out(robot: &Robot) -> impl Iterator<Item = ModelWarning> + '_ {
