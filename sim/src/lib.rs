@@ -11,18 +11,47 @@
 //! assert_eq!(leg.segment(leg.main().centre(stenosis.at_m)).map(|name| name.code()), Some("SFA proximal"));
 //! ```
 //!
+//! The cell around them, driven tick by tick:
+//!
+//! ```
+//! use probepath_robot::{Arm, Command};
+//! use probepath_sim::{CellConfig, SimulatedCell};
+//!
+//! let cell = SimulatedCell::new(&CellConfig::default(), 1)?;
+//! let mut arm = cell.arm();
+//! let state = arm.exchange(&Command::Stay).expect("it answers");
+//! assert!(!state.guiding, "nobody holds the switch");
+//! # Ok::<(), probepath_sim::CellError>(())
+//! ```
+//!
 //! The nouns: a [`Vessel`] is a tube with an exact lumen; a [`Leg`] or a [`VascularPhantom`] is skin and vessels;
 //! [`Tissue`] is what the beam meets.
 //!
 //! What it does not do: know any algorithm under test. It leans on none, and its truth goes to tests and reports only.
 
+mod arm;
+mod cell;
+mod hand;
+mod knobs;
 mod leg;
 mod phantom;
+mod random;
+mod skin;
 mod spline;
+mod subject;
 mod tissue;
 mod vessel;
 
+pub use arm::{KinematicError, SensorConfig, SimulatedArm};
+pub use cell::{
+    ArmConfig, ArmKind, CellConfig, CellError, MachineConfig, Moment, Nominal, SimulatedCell, SimulatedHand,
+    SubjectConfig, TICK, Truth, ZoomConfig,
+};
+pub use hand::HandConfig;
+pub use knobs::{ArmKnobs, Interval, Knobs, MachineKnobs, Ticks};
 pub use leg::{Leg, LegConfig, Side};
 pub use phantom::{PhantomConfig, VascularPhantom};
+pub use skin::{HALF_FACE_X_M, HALF_FACE_Y_M, SkinConfig, Surface};
+pub use subject::Subject;
 pub use tissue::{Homogeneous, Reflector, Tissue};
 pub use vessel::{Calibre, Segment, SegmentName, Stenosis, SurfaceGrid, Vessel};

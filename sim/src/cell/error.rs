@@ -1,0 +1,40 @@
+//! Why there is no cell.
+
+use probepath_robot::{ModelError, NoInverse};
+use thiserror::Error;
+
+/// Why a simulated cell could not be built.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum CellError {
+    /// A number of the configuration that nothing can have.
+    #[error("the cell's {field} is {value}; it may be {low} to {high}")]
+    Config {
+        /// Which field.
+        field: String,
+        /// What it is.
+        value: f64,
+        /// The least it may be.
+        low: f64,
+        /// The most it may be.
+        high: f64,
+    },
+    /// The arm's true chain, which is its model with small errors, is no model.
+    #[error("the simulated arm's true chain cannot be built: choose a smaller arm.kinematic_error")]
+    Model(#[from] ModelError),
+    /// The arm's URDF could not be read or written.
+    #[error("the simulated arm's URDF cannot be changed: {why}")]
+    Urdf {
+        /// The cause, in words.
+        why: String,
+    },
+    /// The start posture, over the leg, is not reached.
+    #[error("the arm does not reach its start posture over the table")]
+    Start(#[from] NoInverse),
+}
+
+impl CellError {
+    pub(crate) fn urdf(error: &urdf_rs::UrdfError) -> Self {
+        Self::Urdf { why: error.to_string() }
+    }
+}

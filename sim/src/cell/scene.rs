@@ -1,0 +1,233 @@
+//! The one world that arm, machine and hand share.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use probepath_frames::{Pose, Probe, Stamp, Twist, World, Wrench};
+use probepath_robot::{JointLimit, Joints};
+
+use super::config::{ArmConfig, CellConfig};
+use super::nominal::Nominal;
+use super::{CellError, TICK};
+use crate::arm::error::{Blueprint, TrueChain};
+use crate::arm::sensor::Sensor;
+use crate::arm::servo::Servo;
+use crate::hand::{Course, Hand, HandConfig};
+use crate::random::Stream;
+use crate::skin::Skin;
+use crate::subject::Subject;
+
+/// What truly was at one tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moment {
+    /// When.
+    pub stamp: Stamp,
+    /// The joints as they truly were, beyond the gears' play (rad, m).
+    pub joints: Joints,
+    /// Where the probe truly was.
+    pub world_from_probe: Pose<World, Probe>,
+    /// What the skin did to it.
+    pub skin: Wrench<Probe>,
+    /// What the hand did to it.
+    pub hand: Wrench<Probe>,
+    /// Whether the hand held the switch.
+    pub guiding: bool,
+}
+
+/// A handle on the world.
+#[derive(Clone, Debug)]
+pub(crate) struct Shared(Arc<Mutex<Scene>>);
+
+impl Shared {
+    pub(crate) fn new(scene: Scene) -> Self {
+        Self(Arc::new(Mutex::new(scene)))
+    }
+
+    /// The world, for one caller at a time. A caller that panicked left it between two ticks, which is harmless.
+    pub(crate) fn lock(&self) -> MutexGuard<'_, Scene> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The world: what lies there, how the arm stands, and everything that was.
+#[derive(Debug)]
+pub(crate) struct Scene {
+    subject: Arc<Subject>,
+    skin: Skin,
+    nominal: Nominal,
+    config: ArmConfig,
+    chain: TrueChain,
+    servo: Servo,
+    sensor: Sensor,
+    encoder: Stream,
+    hand: Option<Hand>,
+    seed: u64,
+    guided: u64,
+    connections: u64,
+    moments: Vec<Moment>,
+}
+
+impl Scene {
+    pub(crate) fn new(
+        config: &CellConfig,
+        nominal: Nominal,
+        subject: Arc<Subject>,
+        seed: u64,
+    ) -> Result<Self, CellError> {
+        let blueprint = Blueprint {
+            urdf: nominal.urdf,
+            base_link: nominal.base_link,
+            tip_link: nominal.tip_link,
+            flange_from_probe: nominal.flange_from_probe,
+            start: nominal.start,
+        };
+        let mut scene = Self {
+            subject,
+            skin: Skin::new(&config.skin, seed),
+            config: config.arm.clone(),
+            chain: TrueChain::new(&blueprint, config.arm.kinematic_error, seed)?,
+            servo: Servo::new(nominal.start, config.arm.servo_lag_ms * 1e-3),
+            sensor: Sensor::new(&config.sensor, TICK.seconds(), seed),
+            encoder: Stream::new(seed, "encoder"),
+            hand: None,
+            seed,
+            guided: 0,
+            connections: 0,
+            moments: Vec::new(),
+            nominal,
+        };
+        let (joints, world_from_probe) = scene.reached();
+        let (skin, hand) = (Wrench::zero(), Wrench::zero());
+        let stamp = Stamp::ZERO;
+        scene.moments.push(Moment { stamp, joints, world_from_probe, skin, hand, guiding: false });
+        Ok(scene)
+    }
+
+    /// One tick: the servo, the gears, the hand, the skin.
+    pub(crate) fn advance(&mut self, told: &Joints) {
+        self.servo.step(told, TICK.seconds());
+        let (joints, world_from_probe) = self.reached();
+        let last = *self.last();
+        let step = last.world_from_probe.twist_to(&world_from_probe);
+        let per_s = 1.0 / TICK.seconds();
+        let twist = Twist::new(step.linear * per_s, step.angular * per_s);
+        let skin = self.skin.press(&*self.subject, &world_from_probe, &twist);
+        let felt = skin.force.norm();
+        let grip = self.hand.as_mut().map(|hand| hand.step(&world_from_probe, &twist, felt, TICK.seconds()));
+        let (hand, guiding) = grip.map_or((Wrench::zero(), false), |grip| (grip.wrench, grip.guiding));
+        let stamp = last.stamp + TICK;
+        self.moments.push(Moment { stamp, joints, world_from_probe, skin, hand, guiding });
+    }
+
+    /// Where the motors' positions truly bring the probe.
+    fn reached(&mut self) -> (Joints, Pose<World, Probe>) {
+        let joints = self.chain.follow(self.servo.position());
+        let base_from_probe = self.chain.model.forward(&joints) * self.nominal.flange_from_probe;
+        (joints, self.nominal.world_from_base * base_from_probe)
+    }
+
+    /// A hand takes the probe.
+    pub(crate) fn guide(&mut self, config: &HandConfig) {
+        let vessel = self.subject.main();
+        let from_m = self.subject.origin_m() + config.start_mm * 1e-3;
+        let length_m = (config.length_mm * 1e-3).min(vessel.length_m() - from_m);
+        let course = Course::over(&*self.subject, &self.skin, vessel, from_m, length_m);
+        let seed = self.seed.wrapping_add(self.guided);
+        self.hand = Some(Hand::new(config, course, self.last().world_from_probe, seed));
+        self.guided += 1;
+    }
+
+    pub(crate) fn let_go(&mut self) {
+        if let Some(hand) = &mut self.hand {
+            hand.let_go();
+        }
+    }
+
+    pub(crate) fn hand_guides(&self) -> bool {
+        self.hand.as_ref().is_some_and(Hand::guides)
+    }
+
+    /// A connection takes the sensor's bias off.
+    pub(crate) fn connect(&mut self) {
+        self.connections += 1;
+    }
+
+    /// Whether somebody connected again, which recovers from what a knob did.
+    pub(crate) const fn recovered(&self) -> bool {
+        self.connections > 1
+    }
+
+    #[allow(
+        clippy::indexing_slicing,
+        reason = "the first moment is there from the beginning and none is removed"
+    )]
+    pub(crate) fn last(&self) -> &Moment {
+        &self.moments[self.moments.len() - 1]
+    }
+
+    pub(crate) fn moments(&self) -> &[Moment] {
+        &self.moments
+    }
+
+    /// Ticks since the world's beginning.
+    pub(crate) const fn tick(&self) -> u64 {
+        self.moments.len() as u64 - 1
+    }
+
+    pub(crate) fn now(&self) -> Stamp {
+        self.last().stamp
+    }
+
+    pub(crate) const fn told(&self) -> &Joints {
+        self.servo.told()
+    }
+
+    pub(crate) fn braked(&self) -> Joints {
+        self.servo.braked(self.config.braking_rad_s2, TICK.seconds())
+    }
+
+    pub(crate) fn limits(&self) -> &[JointLimit] {
+        self.nominal.model().limits()
+    }
+
+    pub(crate) const fn stops_above_n(&self) -> f64 {
+        self.config.stops_above_n
+    }
+
+    /// How hard skin and hand push together (N).
+    pub(crate) fn pushed_n(&self) -> f64 {
+        (self.last().skin + self.last().hand).force.norm()
+    }
+
+    pub(crate) fn guiding(&self) -> bool {
+        self.last().guiding
+    }
+
+    /// The motors' encoders: position and velocity.
+    pub(crate) fn encoders(&mut self) -> (Joints, Joints) {
+        let noisy = |joints: &Joints, deviation: f64, stream: &mut Stream| {
+            let mut all = *joints;
+            all.as_mut_slice().iter_mut().for_each(|q| *q += deviation * stream.normal());
+            all
+        };
+        let position = noisy(self.servo.position(), self.config.position_noise_rad, &mut self.encoder);
+        (position, noisy(self.servo.velocity(), self.config.velocity_noise_rad_s, &mut self.encoder))
+    }
+
+    /// What the force sensor reads, `elapsed_s` after its bias was taken off.
+    pub(crate) fn sensed(&mut self, elapsed_s: f64) -> Wrench<Probe> {
+        let truth = self.last().skin + self.last().hand;
+        self.sensor.read(truth, elapsed_s)
+    }
+
+    /// Where the probe truly was between two ticks; `None` before the beginning and after now.
+    pub(crate) fn world_from_probe(&self, at: Stamp) -> Option<Pose<World, Probe>> {
+        let since = (at - Stamp::ZERO).nanoseconds();
+        let index = usize::try_from(since / TICK.nanoseconds()).ok().filter(|_| since >= 0)?;
+        let before = self.moments.get(index)?;
+        let fraction = (at - before.stamp).seconds() / TICK.seconds();
+        if at == before.stamp {
+            return Some(before.world_from_probe);
+        }
+        Some(before.world_from_probe.interpolate(&self.moments.get(index + 1)?.world_from_probe, fraction))
+    }
+}

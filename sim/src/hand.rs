@@ -1,0 +1,302 @@
+//! The virtual hand: guides the probe along the leg as a person would.
+//!
+//! It holds the probe's holder below the force sensor, sees the leg's surface and, in the picture, the artery; it is
+//! a spring and a damper toward a place that wanders along the skin over the artery, with tremor, at an unsteady
+//! speed, with pauses, turning back, hurrying, and lifting off. It presses until it feels the force that it wants. How
+//! the arm gives way is the control software's business, not the hand's.
+
+mod course;
+mod plan;
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use probepath_frames::{Pose, Probe, Twist, World, Wrench};
+use serde::{Deserialize, Serialize};
+
+use crate::random::{Stream, Wander};
+pub(crate) use course::Course;
+use plan::{Plan, Stroke};
+
+/// How the hand guides.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct HandConfig {
+    /// How far along the artery's course (mm).
+    pub length_mm: f64,
+    /// Where it begins, from the groin's fold (leg) or the superior end (phantom), along the artery (mm).
+    pub start_mm: f64,
+    /// Its usual speed on the skin (mm/s); strokes differ by a factor of 0.7 to 1.3, a hurried one by 2.2.
+    pub speed_mm_s: f64,
+    /// The force it usually presses with (N); it wanders by a quarter.
+    pub press_n: f64,
+    /// Tremor and wander, as a multiple of a usual person's: 0 is a machine's hand.
+    pub unsteadiness: f64,
+    /// Whether it pauses, turns back, hurries and lifts on the way.
+    pub mishaps: bool,
+}
+
+impl Default for HandConfig {
+    fn default() -> Self {
+        Self {
+            length_mm: 220.0,
+            start_mm: 5.0,
+            speed_mm_s: 15.0,
+            press_n: 4.5,
+            unsteadiness: 1.0,
+            mishaps: true,
+        }
+    }
+}
+
+/// The hand's spring (N/m, N m/rad) and damper (N s/m, N m s/rad), and its strength (N, N m).
+const SPRING_N_M: f64 = 400.0;
+const DAMPER_N_S_M: f64 = 12.0;
+const TURN_SPRING_N_M: f64 = 8.0;
+const TURN_DAMPER_N_M_S: f64 = 0.15;
+const STRONGEST_N: f64 = 40.0;
+const STRONGEST_N_M: f64 = 5.0;
+/// Height over the skin from which it comes down, and to which it rises at the end (m).
+const HOVER_M: f64 = 0.040;
+/// Its speed through the air (m/s), and down to the skin (m/s).
+const AIR_M_S: f64 = 0.060;
+const DOWN_M_S: f64 = 0.015;
+/// A hand slows when the probe is left behind: at this distance (m) it waits.
+const WAITS_AT_M: f64 = 0.050;
+/// How fast it presses deeper for each newton that it misses (m/(N s)), and at most (m).
+const PRESS_M_N_S: f64 = 0.004;
+const DEEPEST_M: f64 = 0.045;
+/// It has felt the skin from this force on (N).
+const TOUCH_N: f64 = 0.7;
+
+/// Where the hand is on its way.
+///
+/// ```text
+/// Approach -> Descend -> Follow -> Rise -> Released
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+enum Phase {
+    /// Through the air to the place over the start.
+    Approach { from: Pose<World, Probe>, gone_m: f64 },
+    /// Down, until it feels the skin.
+    Descend,
+    /// Along the plan's strokes.
+    Follow { stroke: usize, waited_s: f64 },
+    /// Up again.
+    Rise,
+    /// The switch is let go.
+    Released,
+}
+
+/// A hand on the probe.
+#[derive(Clone, Debug)]
+pub(crate) struct Hand {
+    config: HandConfig,
+    course: Course,
+    plan: Plan,
+    habits: Habits,
+    phase: Phase,
+    clock_s: f64,
+    /// Where along the course (m), and how fast (m/s).
+    at_m: f64,
+    speed_m_s: f64,
+    /// How far under the skin it holds the spring's end (m); negative is above.
+    depth_m: f64,
+    last: Option<Pose<World, Probe>>,
+    moving: Vector3<f64>,
+}
+
+/// A person's unsteadiness: slow wandering and tremor (3 to 8 Hz) of place and orientation.
+#[derive(Clone, Debug)]
+struct Habits {
+    wander: [Wander; 5],
+    tremor: [Wander; 5],
+    press: Wander,
+}
+
+impl Habits {
+    fn new(seed: u64) -> Self {
+        let mut stream = Stream::new(seed, "hand");
+        let mut of = |low, high| std::array::from_fn(|_| Wander::new(&mut stream, low, high));
+        let (wander, tremor) = (of(0.1, 0.4), of(3.0, 8.0));
+        let press = Wander::new(&mut stream, 0.08, 0.25);
+        Self { wander, tremor, press }
+    }
+
+    /// The hand's error at `t` seconds: place (m) across, along and in depth; turn (rad) about x, y, z of the probe.
+    fn at(&self, t: f64) -> (Vector3<f64>, Vector3<f64>) {
+        let mix = |i: usize, slow: f64, fast: f64| slow * self.wander[i].at(t) + fast * self.tremor[i].at(t);
+        let place = Vector3::new(mix(0, 1.2e-3, 0.15e-3), mix(1, 0.0, 0.15e-3), 0.0);
+        let turn = Vector3::new(mix(2, 0.035, 0.004), mix(3, 0.035, 0.004), mix(4, 0.035, 0.004));
+        (place, turn)
+    }
+}
+
+/// What the hand does in one tick.
+pub(crate) struct Grip {
+    /// What it does to the probe.
+    pub(crate) wrench: Wrench<Probe>,
+    /// Whether it holds the switch.
+    pub(crate) guiding: bool,
+}
+
+impl Hand {
+    /// A hand that takes the probe at `from` and follows `course`.
+    pub(crate) fn new(config: &HandConfig, course: Course, from: Pose<World, Probe>, seed: u64) -> Self {
+        Self {
+            config: config.clone(),
+            plan: Plan::new(config, course.length_m(), seed),
+            course,
+            habits: Habits::new(seed),
+            phase: Phase::Approach { from, gone_m: 0.0 },
+            clock_s: 0.0,
+            at_m: 0.0,
+            speed_m_s: 0.0,
+            depth_m: -HOVER_M,
+            last: None,
+            moving: Vector3::zeros(),
+        }
+    }
+
+    /// Whether it still holds the probe.
+    pub(crate) fn guides(&self) -> bool {
+        self.phase != Phase::Released
+    }
+
+    /// Lets go at once.
+    pub(crate) fn let_go(&mut self) {
+        self.phase = Phase::Released;
+    }
+
+    /// One tick of `seconds`: the probe is at `probe`, moves with `twist`, and the skin pushes with `skin_n`.
+    pub(crate) fn step(
+        &mut self,
+        probe: &Pose<World, Probe>,
+        twist: &Twist<Probe>,
+        skin_n: f64,
+        seconds: f64,
+    ) -> Grip {
+        if !self.guides() {
+            return Grip { wrench: Wrench::zero(), guiding: false };
+        }
+        let target = self.target();
+        let left_behind = target.origin().distance(&probe.origin());
+        let pace = (1.5 - left_behind / (WAITS_AT_M / 1.5)).clamp(0.0, 1.0);
+        self.clock_s += seconds;
+        self.advance(skin_n, pace, seconds);
+        let wrench = self.pull(&target, probe, twist, seconds);
+        Grip { wrench, guiding: self.guides() }
+    }
+
+    /// Where the spring's end is now.
+    fn target(&self) -> Pose<World, Probe> {
+        if let Phase::Approach { from, gone_m } = &self.phase {
+            let over = self.held(-HOVER_M);
+            let way = from.origin().distance(&over.origin()).max(1e-3);
+            return from.interpolate(&over, smooth(gone_m / way));
+        }
+        self.held(self.depth_m)
+    }
+
+    /// The place over the artery, `depth` under the skin, with the hand's unsteadiness.
+    fn held(&self, depth: f64) -> Pose<World, Probe> {
+        let (place, turn) = self.habits.at(self.clock_s);
+        let u = self.config.unsteadiness;
+        let off = place * u + Vector3::new(0.0, 0.0, depth);
+        let wobble = Isometry3::from_parts(off.into(), UnitQuaternion::from_scaled_axis(turn * u));
+        // FRAMES: the probe as the hand means to hold it, written in the ideal probe of the course.
+        self.course.at(self.at_m) * Pose::assume(wobble)
+    }
+
+    /// Moves along the plan.
+    fn advance(&mut self, skin_n: f64, pace: f64, seconds: f64) {
+        match &mut self.phase {
+            Phase::Approach { from, gone_m } => {
+                let way = from.origin().distance(&self.course.at(0.0).origin()) + HOVER_M;
+                *gone_m += AIR_M_S * pace * seconds;
+                if *gone_m > way {
+                    self.phase = Phase::Descend;
+                }
+            }
+            Phase::Descend => {
+                self.depth_m = (self.depth_m + DOWN_M_S * pace * seconds).min(DEEPEST_M);
+                if skin_n > TOUCH_N {
+                    self.phase = Phase::Follow { stroke: 0, waited_s: 0.0 };
+                }
+            }
+            Phase::Follow { .. } => self.follow(skin_n, pace, seconds),
+            Phase::Rise => {
+                self.depth_m -= AIR_M_S * 0.7 * pace * seconds;
+                if self.depth_m < -HOVER_M {
+                    self.phase = Phase::Released;
+                }
+            }
+            Phase::Released => {}
+        }
+    }
+
+    /// The stroke that it is in: goes there, waits, or lifts; presses meanwhile.
+    fn follow(&mut self, skin_n: f64, pace: f64, seconds: f64) {
+        let Phase::Follow { stroke, waited_s } = &mut self.phase else { return };
+        let Some(now) = self.plan.strokes.get(*stroke) else {
+            self.phase = Phase::Rise;
+            return;
+        };
+        *waited_s += seconds;
+        let (wish, lift, done) = match *now {
+            Stroke::Go { to_m, speed_m_s } => {
+                let left = to_m - self.at_m;
+                let slowing = speed_m_s.min(left.abs() / 0.15 + 1e-3);
+                (left.signum() * slowing * pace, false, left.abs() < 0.3e-3)
+            }
+            Stroke::Pause { seconds } => (0.0, false, *waited_s > seconds),
+            // It goes on once it feels the skin again, or gives up feeling for it.
+            Stroke::Lift { seconds } => {
+                let down = *waited_s > seconds && (skin_n > TOUCH_N || *waited_s > seconds + 3.0);
+                (0.0, *waited_s < 0.6 * seconds, down)
+            }
+        };
+        if done {
+            (*stroke, *waited_s) = (*stroke + 1, 0.0);
+        }
+        self.speed_m_s += (wish - self.speed_m_s) * (seconds / 0.08);
+        self.at_m = (self.at_m + self.speed_m_s * seconds).clamp(0.0, self.course.length_m());
+        self.press(skin_n, lift, seconds);
+    }
+
+    /// Deeper when it feels too little, higher when too much; off the skin when it lifts.
+    fn press(&mut self, skin_n: f64, lift: bool, seconds: f64) {
+        if lift {
+            self.depth_m = (self.depth_m - 0.05 * seconds).max(-0.012);
+            return;
+        }
+        let wanted = self.config.press_n
+            * (1.0 + 0.12 * self.config.unsteadiness * self.habits.press.at(self.clock_s));
+        let step = PRESS_M_N_S * (wanted - skin_n).clamp(-6.0, 6.0);
+        self.depth_m = (self.depth_m + step * seconds).clamp(-HOVER_M, DEEPEST_M);
+    }
+
+    /// The spring and the damper, no stronger than a person's.
+    fn pull(
+        &mut self,
+        target: &Pose<World, Probe>,
+        probe: &Pose<World, Probe>,
+        twist: &Twist<Probe>,
+        seconds: f64,
+    ) -> Wrench<Probe> {
+        let went = self
+            .last
+            .map_or(Vector3::zeros(), |last| (target.origin().vector() - last.origin().vector()) / seconds);
+        self.last = Some(*target);
+        self.moving += (went - self.moving) * (seconds / 0.03);
+        let error = (probe.inverse() * *target).isometry().to_owned();
+        let moving = (probe.inverse().isometry().rotation) * self.moving;
+        let force = error.translation.vector * SPRING_N_M + (moving - twist.linear) * DAMPER_N_S_M;
+        let torque = error.rotation.scaled_axis() * TURN_SPRING_N_M - twist.angular * TURN_DAMPER_N_M_S;
+        Wrench::new(force.cap_magnitude(STRONGEST_N), torque.cap_magnitude(STRONGEST_N_M))
+    }
+}
+
+/// From 0 to 1 without a jerk at either end.
+fn smooth(fraction: f64) -> f64 {
+    let t = fraction.clamp(0.0, 1.0);
+    t * t * t * (10.0 + t * (6.0 * t - 15.0))
+}
