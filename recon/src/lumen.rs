@@ -1,0 +1,188 @@
+//! The lumen in each B-scan of a sweep: the seed goes from image to image, the wall is fitted in each.
+
+mod beam;
+mod fit;
+mod refusal;
+mod region;
+mod seed;
+mod track;
+
+use probepath_frames::{Point, World};
+use probepath_us_capture::PlacedBScan;
+use rayon::prelude::*;
+
+pub use refusal::NoLumen;
+
+use crate::patch::{Patch, PowerOfGrey};
+use crate::settings::FWHM;
+use crate::{LumenSettings, SeedPoint};
+use fit::{Border, FitInput, Plane};
+use region::Region;
+
+/// The border of the lumen in one image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contour {
+    /// Columns and rows of its points, a closed line of equal angles round the centre.
+    pub pixels: Vec<(f64, f64)>,
+    /// Column and row of its centre of gravity.
+    pub centre_pixel: (f64, f64),
+    /// The same points in the World.
+    pub world: Vec<Point<World>>,
+    /// Its centre of gravity in the World.
+    pub centre: Point<World>,
+    /// Area inside it, in the image's plane, which need not be normal to the vessel (mm2).
+    pub area_mm2: f64,
+    /// Standard deviation of its points (mm): what the speckle leaves open, no systematic error.
+    pub sd_mm: f64,
+    /// Whether the dark region runs on beyond it: a branch, or a vein that lies against it.
+    pub branches: bool,
+    /// The wall's thickness (mm).
+    pub wall_mm: f64,
+    /// How much brighter than the lumen the wall is (dB).
+    pub contrast_db: f64,
+}
+
+/// What one image gave.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImageLumen {
+    /// The B-scan's number.
+    pub number: u64,
+    /// The border of the lumen, or why there is none.
+    pub lumen: Result<Contour, NoLumen>,
+}
+
+/// The lumen of every image, in their order. The images are a sweep: each shows the vessel near where the one
+/// before has it. At a branch, the lumen that goes on straightest is followed.
+///
+/// The settings and images are taken as they are: [`reconstruct_lumen`](crate::reconstruct_lumen) checks them.
+pub fn segment(images: &[PlacedBScan], settings: &LumenSettings) -> Vec<ImageLumen> {
+    let table = PowerOfGrey::new(settings.dynamic_range_db);
+    let look = Look { table: &table, settings };
+    let regions = track::follow(images, &table, settings);
+    let fit = |(image, region): (&PlacedBScan, &Result<Region, NoLumen>)| {
+        let region = region.as_ref().map_err(|why| *why)?;
+        look.fitted(image, region, &Plane::ITSELF, None)
+    };
+    let mut borders: Vec<Result<Border, NoLumen>> = images.par_iter().zip(&regions).map(fit).collect();
+    for _ in 0..PASSES {
+        let planes = beam::planes(images, &borders, &settings.point_spread);
+        let again = |((image, region), (border, planes)): (
+            (&PlacedBScan, &Result<Region, NoLumen>),
+            (_, &Vec<Plane>),
+        )| {
+            let border: &Result<Border, NoLumen> = border;
+            let (Ok(region), Ok(earlier)) = (region, border) else { return border.clone() };
+            look.fitted(image, region, planes, Some(earlier))
+        };
+        borders = images.par_iter().zip(&regions).zip(borders.par_iter().zip(&planes)).map(again).collect();
+    }
+    let each = images.iter().zip(regions.iter().zip(borders));
+    each.map(|(image, (region, border))| {
+        let lumen = match (region, border) {
+            (Ok(region), Ok(border)) => look.accepted(image, &border, region),
+            (Err(why), _) => Err(*why),
+            (_, Err(why)) => Err(why),
+        };
+        ImageLumen { number: image.bscan.number, lumen }
+    })
+    .collect()
+}
+
+/// How often the wall is fitted again with what the neighbouring images say about the beam's thickness.
+const PASSES: usize = 2;
+
+/// What every fit needs.
+struct Look<'a> {
+    table: &'a PowerOfGrey,
+    settings: &'a LumenSettings,
+}
+
+impl Look<'_> {
+    /// The wall, fitted round a region.
+    fn fitted(
+        &self,
+        image: &PlacedBScan,
+        region: &Region,
+        planes: &[Plane],
+        earlier: Option<&Border>,
+    ) -> Result<Border, NoLumen> {
+        let setting = &image.bscan.setting;
+        let depth = setting.window_top_m + region.centre.1;
+        let spread = &self.settings.point_spread;
+        let sigma = (spread.lateral_m(depth, setting) / FWHM, spread.axial_fwhm_m / FWHM);
+        let wall = self.settings.wall_thickness_m;
+        let far = region.radii.iter().copied().fold(0.0, f64::max) + wall + 2.0e-3;
+        let half = (far + 2.0 * sigma.0, far + 2.0 * sigma.1);
+        let outside = NoLumen::OutsidePicture { x_mm: region.centre.0 * 1e3, y_mm: region.centre.1 * 1e3 };
+        let patch = Patch::around(&image.bscan, self.table, region.centre, half, (0.25e-3, 0.125e-3));
+        let patch = &patch.ok_or(outside)?;
+        fit::fit(&FitInput { patch, region, sigma, wall, planes, earlier })
+    }
+
+    /// The contour of a border that is one of a lumen.
+    fn accepted(&self, image: &PlacedBScan, border: &Border, region: &Region) -> Result<Contour, NoLumen> {
+        let contour = contour(image, border, region);
+        let radius = (contour.area_mm2 / std::f64::consts::PI).sqrt();
+        let (low, high) = self.settings.radius_range_m;
+        if !(low * 1e3..high * 1e3).contains(&radius) {
+            return Err(NoLumen::Radius { radius_mm: radius });
+        }
+        if border.walled < 0.6 {
+            return Err(NoLumen::NoWall { percent: 100.0 * border.walled });
+        }
+        if border.contrast_db < 6.0 {
+            return Err(NoLumen::NoContrast { contrast_db: border.contrast_db });
+        }
+        Ok(contour)
+    }
+}
+
+fn contour(image: &PlacedBScan, border: &Border, region: &Region) -> Contour {
+    let points = border.contour();
+    let (area, centre) = area_and_centre(&points);
+    let spacing = image.bscan.setting.spacing;
+    let pixel = |(x, y): (f64, f64)| (x / spacing.x_m, y / spacing.y_m);
+    let world = |(x, y): (f64, f64)| image.world_from_image * Point::new(x, y, 0.0);
+    let own = points.len() as f64;
+    let filled = region.radii.iter().map(|r| r * r).sum::<f64>() * std::f64::consts::PI / own * region.excess;
+    Contour {
+        pixels: points.iter().map(|&point| pixel(point)).collect(),
+        centre_pixel: pixel(centre),
+        world: points.iter().map(|&point| world(point)).collect(),
+        centre: world(centre),
+        area_mm2: area * 1e6,
+        sd_mm: border.sd * 1e3,
+        branches: region.excess > 1.3 || filled > 1.1 * area,
+        wall_mm: border.wall * 1e3,
+        contrast_db: border.contrast_db,
+    }
+}
+
+/// Area and centre of gravity of a closed line (Green's theorem). A line without area has its mean as centre.
+pub(crate) fn area_and_centre(points: &[(f64, f64)]) -> (f64, (f64, f64)) {
+    let n = points.len().max(1) as f64;
+    let mean = points.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / n, sum.1 + p.1 / n));
+    let (mut area, mut x, mut y) = (0.0, 0.0, 0.0);
+    for (a, b) in points.iter().zip(points.iter().cycle().skip(1)) {
+        let (ax, ay, bx, by) = (a.0 - mean.0, a.1 - mean.1, b.0 - mean.0, b.1 - mean.1);
+        let cross = ax * by - bx * ay;
+        area += cross / 2.0;
+        x += (ax + bx) * cross / 6.0;
+        y += (ay + by) * cross / 6.0;
+    }
+    if area.abs() < 1e-30 {
+        return (0.0, mean);
+    }
+    (area.abs(), (mean.0 + x / area, mean.1 + y / area))
+}
+
+impl SeedPoint {
+    /// In metres from the centre of the first pixel.
+    fn place(&self, image: &PlacedBScan) -> (f64, f64) {
+        let spacing = image.bscan.setting.spacing;
+        match *self {
+            Self::Pixel { column, row } => (column * spacing.x_m, row * spacing.y_m),
+            Self::Millimetres { x_mm, y_mm } => (x_mm * 1e-3, y_mm * 1e-3),
+        }
+    }
+}

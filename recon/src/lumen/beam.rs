@@ -1,0 +1,99 @@
+//! What the beam's thickness takes in. Across the plane the beam is 3 to 4 mm thick ([P1] II.B): where the vessel
+//! narrows or runs obliquely, the picture is the mean of neighbouring sections, and its wall is smeared inward. How
+//! the sections differ is read from the neighbouring images.
+
+use nalgebra::{Matrix3, Vector3};
+use probepath_frames::Point;
+use probepath_us_capture::PlacedBScan;
+use rayon::prelude::*;
+
+use super::NoLumen;
+use super::fit::{Border, Plane};
+use super::region::{RAYS, angle};
+use crate::PointSpread;
+use crate::settings::FWHM;
+
+/// Standard deviation of the weights of the neighbours (m), and how far they reach.
+const NEAR_M: f64 = 1.8e-3;
+const REACH_M: f64 = 4.5e-3;
+/// Planes, and how far apart they are in standard deviations.
+const PLANES: i32 = 4;
+const STEP: f64 = 0.6;
+
+/// Where a contour lies.
+struct Section {
+    centre: Vector3<f64>,
+    radius: f64,
+}
+
+/// The planes of every image's beam.
+pub(crate) fn planes(
+    images: &[PlacedBScan],
+    borders: &[Result<Border, NoLumen>],
+    spread: &PointSpread,
+) -> Vec<Vec<Plane>> {
+    let sections: Vec<Option<Section>> = images.iter().zip(borders).map(|(i, b)| section(i, b)).collect();
+    (0..images.len()).into_par_iter().map(|index| of_image(index, images, &sections, spread)).collect()
+}
+
+fn section(image: &PlacedBScan, border: &Result<Border, NoLumen>) -> Option<Section> {
+    let border = border.as_ref().ok()?;
+    let (_, centre) = super::area_and_centre(&border.contour());
+    let square = (0..RAYS).map(|ray| border.radius(angle(ray)).powi(2)).sum::<f64>() / RAYS as f64;
+    let centre = image.world_from_image * Point::new(centre.0, centre.1, 0.0);
+    Some(Section { centre: centre.vector(), radius: square.sqrt() })
+}
+
+fn of_image(
+    index: usize,
+    images: &[PlacedBScan],
+    sections: &[Option<Section>],
+    spread: &PointSpread,
+) -> Vec<Plane> {
+    let Some((image, Some(own))) = images.get(index).zip(sections.get(index)) else {
+        return Plane::ITSELF.to_vec();
+    };
+    let image_from_world = image.world_from_image.inverse();
+    let here = (image_from_world * Point::from_vector(own.centre)).vector();
+    let near = sections.iter().flatten().filter_map(|other| {
+        let offset = (image_from_world * Point::from_vector(other.centre)).vector() - here;
+        let close = offset.z.abs() < REACH_M && offset.norm() < 2.0 * REACH_M;
+        close.then(|| (offset.z, Vector3::new(offset.x, offset.y, other.radius)))
+    });
+    let Some([slope, curve]) = local_quadratic(near) else { return Plane::ITSELF.to_vec() };
+    let depth = image.bscan.setting.window_top_m + here.y;
+    // Amplitudes add up across the beam, so its squared profile weighs the power.
+    let sigma = spread.elevational_m(depth) / FWHM / 2_f64.sqrt();
+    let weigh = |k: i32| (-0.5 * (STEP * f64::from(k)).powi(2)).exp();
+    let sum: f64 = (-PLANES..=PLANES).map(weigh).sum();
+    (-PLANES..=PLANES)
+        .map(|k| {
+            let off = STEP * f64::from(k) * sigma;
+            let change = slope * off + curve * (off * off / 2.0);
+            let wider = change.z.max(-0.8 * own.radius);
+            Plane { weight: weigh(k) / sum, shift: (change.x, change.y), wider }
+        })
+        .collect()
+}
+
+/// First and second derivative at zero of what is `(place, value)`, by weighted least squares; nothing when the
+/// places are too few or too close to say.
+fn local_quadratic(values: impl Iterator<Item = (f64, Vector3<f64>)>) -> Option<[Vector3<f64>; 2]> {
+    let mut matrix = Matrix3::zeros();
+    let mut right = Matrix3::zeros();
+    let (mut below, mut above, mut count) = (0.0_f64, 0.0_f64, 0);
+    for (z, value) in values {
+        let weight = (-0.5 * (z / NEAR_M).powi(2)).exp();
+        let row = Vector3::new(1.0, z / NEAR_M, (z / NEAR_M).powi(2) / 2.0);
+        matrix += row * row.transpose() * weight;
+        right += row * value.transpose() * weight;
+        (below, above, count) = (below.min(z), above.max(z), count + 1);
+    }
+    if count < 4 || below > -0.5 * NEAR_M || above < 0.5 * NEAR_M {
+        return None;
+    }
+    // A little stiffness, so that two clusters of images do not make a bend.
+    matrix[(2, 2)] += 0.05 * matrix[(0, 0)];
+    let solved = matrix.cholesky()?.solve(&right);
+    Some([solved.row(1).transpose() / NEAR_M, solved.row(2).transpose() / (NEAR_M * NEAR_M)])
+}

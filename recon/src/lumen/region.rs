@@ -1,0 +1,180 @@
+//! The lumen by fast marching on grey-level statistics and gradients, as [P1] II.C.2 has it: a front that starts at
+//! the seed runs where the grey level is likelier lumen than tissue, slows at edges and is stopped at the wall.
+//!
+//! Its border lies inside the wall (the wall's lateral skirt fills the lumen after log compression, FIELD.md
+//! section 8): it says where the lumen is, and [`fit`](super::fit) says how large.
+
+use super::NoLumen;
+use crate::fast_marching::{MarchGrid, march};
+use crate::patch::Patch;
+
+/// Directions in which a border is described.
+pub(crate) const RAYS: usize = 72;
+
+/// What the front filled.
+#[derive(Clone, Debug)]
+pub(crate) struct Region {
+    /// Its centre of gravity (m, in the image).
+    pub(crate) centre: (f64, f64),
+    /// Distance of its border from there along each ray (m).
+    pub(crate) radii: Vec<f64>,
+    /// Its area over the area inside `radii`: well above 1 where it runs on into a branch.
+    pub(crate) excess: f64,
+    /// How much darker it is than what surrounds it (dB).
+    pub(crate) contrast_db: f64,
+}
+
+/// Decibels of lumen and tissue, as normal distributions.
+struct Statistics {
+    lumen: (f64, f64),
+    tissue: (f64, f64),
+}
+
+/// Grows the region round `seed` (m, in the image).
+pub(crate) fn grow(patch: &Patch, seed: (f64, f64)) -> Result<Region, NoLumen> {
+    let outside = NoLumen::OutsidePicture { x_mm: seed.0 * 1e3, y_mm: seed.1 * 1e3 };
+    let db: Vec<f64> =
+        patch.smoothed((0.30e-3, 0.20e-3)).iter().map(|p| 10.0 * p.max(1e-9).log10()).collect();
+    let start = darkest_near(patch, &db, seed, 0.8e-3).ok_or(outside)?;
+    let mut statistics = Statistics { lumen: lumen_round(patch, &db, start), tissue: tissue(&db) };
+    let contrast_db = statistics.tissue.0 - statistics.lumen.0;
+    if contrast_db < 9.0 {
+        return Err(NoLumen::NoContrast { contrast_db });
+    }
+    let first = fill(patch, &db, start, &statistics);
+    statistics.lumen = moments(first.iter().map(|&cell| db[cell]));
+    let cells = fill(patch, &db, start, &statistics);
+    describe(patch, &cells, contrast_db)
+}
+
+/// The darkest cell within `reach` of a place.
+fn darkest_near(patch: &Patch, db: &[f64], place: (f64, f64), reach: f64) -> Option<usize> {
+    patch.cell_at(place)?;
+    within(patch, place, reach).min_by(|&a, &b| db[a].total_cmp(&db[b]))
+}
+
+fn within(patch: &Patch, place: (f64, f64), reach: f64) -> impl Iterator<Item = usize> {
+    (0..patch.power.len()).filter(move |&cell| {
+        let at = patch.place(cell);
+        (at.0 - place.0).hypot(at.1 - place.1) <= reach
+    })
+}
+
+/// What the lumen looks like, learned round the seed.
+fn lumen_round(patch: &Patch, db: &[f64], start: usize) -> (f64, f64) {
+    moments(within(patch, patch.place(start), 0.5e-3).map(|cell| db[cell]))
+}
+
+/// What surrounds it looks like: the brighter half of the window.
+fn tissue(db: &[f64]) -> (f64, f64) {
+    let mut sorted = db.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    moments(sorted[sorted.len() / 2..].iter().copied())
+}
+
+/// Mean and standard deviation; the latter at least 2.5 dB, what averaged speckle leaves.
+fn moments(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (mut n, mut sum, mut squares) = (0.0, 0.0, 0.0);
+    for value in values {
+        n += 1.0;
+        sum += value;
+        squares += value * value;
+    }
+    let mean = sum / f64::max(n, 1.0);
+    (mean, (squares / f64::max(n, 1.0) - mean * mean).max(0.0).sqrt().max(2.5))
+}
+
+/// The cells the front reaches before it stands.
+fn fill(patch: &Patch, db: &[f64], start: usize, statistics: &Statistics) -> Vec<usize> {
+    let grid = MarchGrid { columns: patch.columns, rows: patch.rows, dx: patch.cell.0, dy: patch.cell.1 };
+    let speed = speed(&grid, db, statistics);
+    // The front stands when what it takes in is slow on the average: it has met the wall nearly everywhere.
+    let mut recent = 1.0;
+    let mut cells = Vec::new();
+    march(&grid, &speed, &[start], |cell, _| {
+        recent += (speed[cell] - recent) / 30.0;
+        cells.push(cell);
+        recent > 0.15
+    });
+    cells.retain(|&cell| speed[cell] > 0.15);
+    cells
+}
+
+/// The probability that a cell is lumen, divided by what the gradient there is worth.
+fn speed(grid: &MarchGrid, db: &[f64], statistics: &Statistics) -> Vec<f64> {
+    let (lumen, tissue) = (statistics.lumen, statistics.tissue);
+    // Darker than lumen is lumen, brighter than tissue is tissue.
+    let away = |from: (f64, f64), value: f64| -0.5 * ((value - from.0) / from.1).powi(2) - from.1.ln();
+    let slope = |a: usize, b: usize, d: f64| (db[a] - db[b]) / (2.0 * d);
+    (0..db.len())
+        .map(|cell| {
+            let value = db[cell].clamp(lumen.0, tissue.0.max(lumen.0));
+            let odds = away(tissue, value) - away(lumen, value);
+            let (x, y) = (cell % grid.columns, cell / grid.columns);
+            let right = if x + 1 < grid.columns { cell + 1 } else { cell };
+            let below = if y + 1 < grid.rows { cell + grid.columns } else { cell };
+            let gx = slope(right, if x > 0 { cell - 1 } else { cell }, grid.dx);
+            let gy = slope(below, if y > 0 { cell - grid.columns } else { cell }, grid.dy);
+            // 20 dB a millimetre is an edge; speckle has half of it.
+            let edge = (gx.hypot(gy) / 20_000.0).powi(2);
+            1.0 / ((1.0 + odds.exp()) * (1.0 + edge)) + 1e-4
+        })
+        .collect()
+}
+
+/// Centre and border of the filled cells.
+fn describe(patch: &Patch, cells: &[usize], contrast_db: f64) -> Result<Region, NoLumen> {
+    let area = cells.len() as f64 * patch.cell.0 * patch.cell.1;
+    let mut filled = vec![false; patch.power.len()];
+    cells.iter().for_each(|&cell| filled[cell] = true);
+    let at_edge = cells.iter().filter(|&&cell| on_edge(patch, cell)).count();
+    if at_edge > (patch.columns + patch.rows) / 4 || 2 * cells.len() > patch.power.len() {
+        return Err(NoLumen::NoBorder { area_mm2: area * 1e6 });
+    }
+    if cells.len() < 4 {
+        return Err(NoLumen::Radius { radius_mm: (area / std::f64::consts::PI).sqrt() * 1e3 });
+    }
+    let n = cells.len() as f64;
+    let sum = cells.iter().map(|&cell| patch.place(cell)).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
+    let centre = (sum.0 / n, sum.1 / n);
+    let raw: Vec<f64> = (0..RAYS).map(|ray| border(patch, &filled, centre, ray)).collect();
+    let mut sorted = raw.clone();
+    sorted.sort_by(f64::total_cmp);
+    // A leak through a weak piece of wall, or a branch, reaches far in few directions.
+    let far = 1.6 * sorted[RAYS / 2];
+    let radii: Vec<f64> = (0..RAYS).map(|ray| median_round(&raw, ray).min(far)).collect();
+    let inside: f64 = radii.iter().map(|r| r * r).sum::<f64>() * std::f64::consts::PI / RAYS as f64;
+    Ok(Region { centre, radii, excess: area / inside.max(1e-12), contrast_db })
+}
+
+fn on_edge(patch: &Patch, cell: usize) -> bool {
+    let (x, y) = (cell % patch.columns, cell / patch.columns);
+    x == 0 || y == 0 || x + 1 == patch.columns || y + 1 == patch.rows
+}
+
+/// The direction of a ray.
+pub(crate) fn angle(ray: usize) -> f64 {
+    ray as f64 * std::f64::consts::TAU / RAYS as f64
+}
+
+/// How far the filled cells go along a ray; a hole of less than 0.3 mm is speckle.
+fn border(patch: &Patch, filled: &[bool], centre: (f64, f64), ray: usize) -> f64 {
+    let (sin, cos) = angle(ray).sin_cos();
+    let step = 0.5 * patch.cell.0.min(patch.cell.1);
+    let (mut last, mut r) = (0.0, 0.0);
+    while r - last < 0.3e-3 {
+        match patch.cell_at((centre.0 + r * cos, centre.1 + r * sin)) {
+            Some(cell) if filled[cell] => last = r,
+            Some(_) => {}
+            None => break,
+        }
+        r += step;
+    }
+    last
+}
+
+fn median_round(radii: &[f64], ray: usize) -> f64 {
+    let mut near: Vec<f64> = (0..5).map(|k| radii[(ray + RAYS + k - 2) % RAYS]).collect();
+    near.sort_by(f64::total_cmp);
+    near[2]
+}

@@ -1,0 +1,107 @@
+//! The seed, from image to image: where the vessel seen so far runs through the next plane.
+
+use nalgebra::Vector3;
+use probepath_frames::Point;
+use probepath_us_capture::PlacedBScan;
+
+use super::region::{Region, grow};
+use super::{NoLumen, seed};
+use crate::LumenSettings;
+use crate::patch::{Patch, PowerOfGrey};
+
+/// Half the window the front may fill, over the largest radius.
+const WINDOW: f64 = 1.4;
+/// The direction of the vessel is taken over this length (m).
+const MEMORY_M: f64 = 6e-3;
+/// A vessel not seen for longer than this is looked for anew (m).
+const LOST_M: f64 = 6e-3;
+/// A picture whose brighter half is darker than this shows no tissue (dB).
+const DARK_DB: f64 = -45.0;
+
+/// The region of every image, in order.
+pub(crate) fn follow(
+    images: &[PlacedBScan],
+    table: &PowerOfGrey,
+    settings: &LumenSettings,
+) -> Vec<Result<Region, NoLumen>> {
+    let mut trail: Vec<Vector3<f64>> = Vec::new();
+    let mut regions = Vec::with_capacity(images.len());
+    for (index, image) in images.iter().enumerate() {
+        let given = settings.seed.filter(|_| index == 0).map(|seed| seed.place(image));
+        let region = region(image, table, settings, &trail, given);
+        if let Ok(region) = &region {
+            let centre = image.world_from_image * Point::new(region.centre.0, region.centre.1, 0.0);
+            trail.push(centre.vector());
+        }
+        regions.push(region);
+    }
+    regions
+}
+
+fn region(
+    image: &PlacedBScan,
+    table: &PowerOfGrey,
+    settings: &LumenSettings,
+    trail: &[Vector3<f64>],
+    given: Option<(f64, f64)>,
+) -> Result<Region, NoLumen> {
+    let mean_db = brighter_half_db(image, table);
+    if mean_db < DARK_DB {
+        return Err(NoLumen::Dark { mean_db });
+    }
+    let predicted = given.or_else(|| predicted(image, trail));
+    let lost = given.is_none() && far_from_trail(image, trail, predicted);
+    let place = match predicted {
+        Some(place) if !lost => place,
+        Some(place) => seed::find(&image.bscan, table, settings, Some((place, 8e-3)))?,
+        None => seed::find(&image.bscan, table, settings, None)?,
+    };
+    let half = WINDOW * settings.radius_range_m.1;
+    let outside = NoLumen::OutsidePicture { x_mm: place.0 * 1e3, y_mm: place.1 * 1e3 };
+    let patch = Patch::around(&image.bscan, table, place, (half, half), (0.16e-3, 0.16e-3)).ok_or(outside)?;
+    let region = grow(&patch, place)?;
+    let by = (region.centre.0 - place.0).hypot(region.centre.1 - place.1);
+    if by > 0.6 * settings.radius_range_m.1 && given.is_none() {
+        return Err(NoLumen::Jump { by_mm: by * 1e3 });
+    }
+    Ok(region)
+}
+
+/// Mean power of the brighter half of the picture (dB), from one pixel in 49.
+fn brighter_half_db(image: &PlacedBScan, table: &PowerOfGrey) -> f64 {
+    let bscan = &image.bscan;
+    let rows = bscan.pixels().chunks_exact(bscan.width()).step_by(7);
+    let mut greys: Vec<u8> = rows.flat_map(|row| row.iter().copied().step_by(7)).collect();
+    greys.sort_unstable();
+    let bright = &greys[greys.len() / 2..];
+    let power: f64 = bright.iter().map(|&grey| table.of(grey)).sum::<f64>() / bright.len().max(1) as f64;
+    10.0 * power.max(1e-9).log10()
+}
+
+/// Where the vessel runs through the image's plane (m, in the image).
+fn predicted(image: &PlacedBScan, trail: &[Vector3<f64>]) -> Option<(f64, f64)> {
+    let last = trail.last()?;
+    let image_from_world = image.world_from_image.inverse();
+    let here = (image_from_world * Point::from_vector(*last)).vector();
+    let before = trail.iter().rev().find(|place| (*place - last).norm() > MEMORY_M);
+    let along = before.map(|before| image_from_world.isometry().rotation * (last - before).normalize());
+    match along {
+        // A vessel nearly in the plane says little about where it goes through.
+        Some(along) if along.z.abs() > 0.4 => {
+            let steps = (-here.z / along.z).clamp(-LOST_M, LOST_M);
+            Some((here.x + along.x * steps, here.y + along.y * steps))
+        }
+        _ => Some((here.x, here.y)),
+    }
+}
+
+/// Whether the last place with a lumen is too far from the plane to say where it is.
+fn far_from_trail(image: &PlacedBScan, trail: &[Vector3<f64>], predicted: Option<(f64, f64)>) -> bool {
+    match (trail.last(), predicted) {
+        (Some(last), Some((x, y))) => {
+            let here = image.world_from_image * Point::new(x, y, 0.0);
+            (here.vector() - last).norm() > LOST_M
+        }
+        _ => false,
+    }
+}
