@@ -5,8 +5,12 @@
 mod bscan;
 mod calibration;
 pub mod exam;
+mod pixel_map;
+pub mod plus;
+pub mod sequence;
 mod source;
 
 pub use bscan::{BScan, BadBScan, PixelSpacing, PlacedBScan, Setting};
 pub use calibration::{BadCalibration, Calibration, CalibrationError};
+pub use pixel_map::{BadPixelMap, PixelMap};
 pub use source::{BScanSource, SourceFault};
