@@ -23,9 +23,8 @@ use ramp::{Bounds, Rate};
 /// Parts of a joint's limit: of the acceleration, for `q'' v^2` and `q' a`; of the jerk, for its three terms.
 const HALF: f64 = 0.5;
 const THIRD: f64 = 1.0 / 3.0;
-/// Nearer to the end than this (m) a clock at rest has arrived; it stops short by at most one tick's way.
-const ARRIVED: f64 = 0.2e-3;
-
+/// Part of the velocity limit: between two postures the slope is a little more than at either (measured: 0.4 %).
+const INSIDE: f64 = 0.98;
 /// How the path is to be driven, besides the joints' limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathSpeed {
@@ -124,7 +123,7 @@ impl PathLimits {
             };
             wanted
                 .speed
-                .min(least_of(&limits.velocity, &slope[0]))
+                .min(INSIDE * least_of(&limits.velocity, &slope[0]))
                 .min(bends(2.0, HALF, &limits.acceleration, &slope[1]))
                 .min(bends(3.0, THIRD, &limits.jerk, &slope[2]))
                 // 3 q'' v a <= jerk / 3
@@ -278,9 +277,12 @@ impl PathClock {
         self.rate == Rate::default()
     }
 
-    /// Whether it has arrived: at rest, at the end (within a tick's way).
+    /// Whether it has arrived: at rest, after slowing down for the end, of which it stops short by what a tick may
+    /// still change (measured: below 0.05 mm when driven gently, below 1 mm at 5 m/s^2).
     pub fn has_arrived(&self) -> bool {
-        self.is_at_rest() && self.limits.length() - self.s < ARRIVED
+        let end = self.limits.length() - HALF * self.limits.step;
+        self.is_at_rest()
+            && (self.s >= self.limits.length() || self.slowing.is_some_and(|(_, place)| place > end))
     }
 
     /// The limits it keeps.

@@ -92,7 +92,7 @@ proptest! {
         let [v, a, j] = read_back(&rows, &joints);
         prop_assert!(v.max(a).max(j) <= 1.0 + 1e-6, "velocity {v}, acceleration {a}, jerk {j}");
         prop_assert!(places.windows(2).all(|p| p[1] >= p[0]), "it went back");
-        prop_assert!(limits.length() - places[places.len() - 1] < 0.2e-3);
+        prop_assert!(limits.length() - places[places.len() - 1] < 1e-3);
     }
 }
 
@@ -103,6 +103,7 @@ fn a_straight_path_is_driven_at_the_wanted_speed_with_one_ramp_at_either_end() {
     let limits = PathLimits::new(STEP, &postures(&way), &joints, PathSpeed::gentle(0.01)).unwrap();
     let (_, places) = drive(&way, &limits, |_| 0.01);
     let seconds = places.len() as f64 * DT;
+    assert!(limits.length() - places[places.len() - 1] < 0.05e-3);
     // 200 mm at 10 mm/s, and what the ramps lose: 2 x half of 0.1 s.
     assert!((seconds - 20.1).abs() < 0.02, "{seconds}");
     let cruising = places.windows(2).filter(|p| ((p[1] - p[0]) / DT - 0.01).abs() < 1e-9).count();
