@@ -25,7 +25,7 @@
 //! ```
 //!
 //! The nouns: a [`Vessel`] is a tube with an exact lumen; a [`Leg`] or a [`VascularPhantom`] is skin and vessels;
-//! [`Tissue`] is what the beam meets.
+//! [`Tissue`] is what the beam meets, and a [`Renderer`] makes the B-scan of it.
 //!
 //! What it does not do: know any algorithm under test. It leans on none, and its truth goes to tests and reports only.
 
@@ -40,6 +40,7 @@ mod skin;
 mod spline;
 mod subject;
 mod tissue;
+mod ultrasound;
 mod vessel;
 
 pub use arm::{KinematicError, SensorConfig, SimulatedArm};
@@ -54,4 +55,5 @@ pub use phantom::{PhantomConfig, VascularPhantom};
 pub use skin::{HALF_FACE_X_M, HALF_FACE_Y_M, SkinConfig, Surface};
 pub use subject::Subject;
 pub use tissue::{Homogeneous, Reflector, Tissue};
+pub use ultrasound::{Contact, ImagingConfig, ImagingError, Renderer, Shadow, settings};
 pub use vessel::{Calibre, Segment, SegmentName, Stenosis, SurfaceGrid, Vessel};
