@@ -6,6 +6,7 @@ mod nominal;
 mod scene;
 mod truth;
 
+use std::fmt;
 use std::sync::Arc;
 
 use probepath_frames::{Span, Stamp};
@@ -19,7 +20,9 @@ pub use truth::Truth;
 
 use crate::arm::SimulatedArm;
 use crate::hand::HandConfig;
+use crate::machine::SimulatedMachine;
 use crate::subject::Subject;
+use crate::ultrasound::Renderer;
 
 /// Between two ticks of the arm: 2 ms.
 pub const TICK: Span = Span::from_milliseconds(2);
@@ -37,13 +40,24 @@ pub const TICK: Span = Span::from_milliseconds(2);
 /// assert_eq!(state.commanded, cell.nominal().start);
 /// # Ok::<(), probepath_sim::CellError>(())
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct SimulatedCell {
     config: CellConfig,
     nominal: Nominal,
     subject: Arc<Subject>,
     scene: Shared,
     truth: Truth,
+    renderer: Arc<Renderer>,
+    seed: u64,
+}
+
+impl fmt::Debug for SimulatedCell {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("SimulatedCell")
+            .field("seed", &self.seed)
+            .field("config", &self.config)
+            .finish_non_exhaustive()
+    }
 }
 
 impl SimulatedCell {
@@ -57,7 +71,8 @@ impl SimulatedCell {
         let subject = Arc::new(Subject::new(&config.subject, seed));
         let scene = Shared::new(Scene::new(config, nominal.clone(), subject.clone(), seed)?);
         let truth = Truth::new(config, &nominal, &subject, &scene, seed);
-        Ok(Self { config: config.clone(), nominal, subject, scene, truth })
+        let renderer = Arc::new(Renderer::new(config.machine.imaging.clone(), seed)?);
+        Ok(Self { config: config.clone(), nominal, subject, scene, truth, renderer, seed })
     }
 
     /// What the software may know.
@@ -73,6 +88,17 @@ impl SimulatedCell {
     /// Connects to the arm; the force sensor's bias is taken off. A second connection recovers from what a knob did.
     pub fn arm(&self) -> SimulatedArm {
         SimulatedArm::new(self.scene.clone(), self.config.knobs.arm.clone())
+    }
+
+    /// Connects to the ultrasound machine: B-scans that are formed from now on.
+    pub fn machine(&self) -> SimulatedMachine {
+        SimulatedMachine::new(
+            self.scene.clone(),
+            self.truth.clone(),
+            self.renderer.clone(),
+            &self.config,
+            self.seed,
+        )
     }
 
     /// The hand that guides.

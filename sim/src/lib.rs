@@ -16,11 +16,12 @@
 //! ```
 //! use probepath_robot::{Arm, Command};
 //! use probepath_sim::{CellConfig, SimulatedCell};
+//! use probepath_us_capture::BScanSource;
 //!
 //! let cell = SimulatedCell::new(&CellConfig::default(), 1)?;
-//! let mut arm = cell.arm();
+//! let (mut arm, mut machine) = (cell.arm(), cell.machine());
 //! let state = arm.exchange(&Command::Stay).expect("it answers");
-//! assert!(!state.guiding, "nobody holds the switch");
+//! assert!(machine.poll(state.stamp).expect("it is switched on").is_none(), "nothing arrives within 2 ms");
 //! # Ok::<(), probepath_sim::CellError>(())
 //! ```
 //!
@@ -34,6 +35,7 @@ mod cell;
 mod hand;
 mod knobs;
 mod leg;
+mod machine;
 mod phantom;
 mod random;
 mod skin;
@@ -51,6 +53,7 @@ pub use cell::{
 pub use hand::HandConfig;
 pub use knobs::{ArmKnobs, Interval, Knobs, MachineKnobs, Ticks};
 pub use leg::{Leg, LegConfig, Side};
+pub use machine::SimulatedMachine;
 pub use phantom::{PhantomConfig, VascularPhantom};
 pub use skin::{HALF_FACE_X_M, HALF_FACE_Y_M, SkinConfig, Surface};
 pub use subject::Subject;

@@ -19,6 +19,8 @@ pub const HALF_FACE_Y_M: f64 = 0.005;
 const ALONG: [f64; 5] = [-0.8, -0.4, 0.0, 0.4, 0.8];
 /// And across it: the two Gauss points, so that a tilt meets the moment of an even pressure.
 const ACROSS: [f64; 2] = [-0.577_350_269_189_625_8, 0.577_350_269_189_625_8];
+/// Parts of the face's length for which it is asked whether they touch.
+const TOUCH_STEPS: u32 = 40;
 /// Sliding slower than this (m/s) is creep: Coulomb's friction sets in smoothly around it.
 const CREEP_M_S: f64 = 0.002;
 /// The probe is far from the skin when its middle is further out than this (m): no point of the face can touch.
@@ -48,6 +50,8 @@ pub struct SkinConfig {
     pub sliding_n_s_m: f64,
     /// Damping of the whole face against pressing (N s/m).
     pub pressing_n_s_m: f64,
+    /// Gap that gel bridges between the face and the skin (mm): there the picture still comes through.
+    pub gel_mm: f64,
 }
 
 impl Default for SkinConfig {
@@ -60,6 +64,7 @@ impl Default for SkinConfig {
             friction: 0.06,
             sliding_n_s_m: 8.0,
             pressing_n_s_m: 6.0,
+            gel_mm: 1.5,
         }
     }
 }
@@ -142,6 +147,25 @@ impl Skin {
         total
     }
 
+    /// Where gel joins the face to the skin: from and to along the probe's x (m), around the middle of what touches;
+    /// `None` when all of it is in the air.
+    pub(crate) fn touched(
+        &self,
+        body: &dyn Surface,
+        world_from_probe: &Pose<World, Probe>,
+    ) -> Option<(f64, f64)> {
+        let step = 2.0 * HALF_FACE_X_M / f64::from(TOUCH_STEPS);
+        let at = |i: u32| -HALF_FACE_X_M + step * f64::from(i);
+        let gap = |i: u32| {
+            let place = *world_from_probe * Point::<Probe>::new(at(i), 0.0, 0.0);
+            self.distance(body, place).0 - self.config.gel_mm * 1e-3
+        };
+        let gaps: Vec<f64> = (0..=TOUCH_STEPS).map(gap).collect();
+        let touching = |i: &u32| gaps.get(*i as usize).is_some_and(|gap| *gap < 0.0);
+        let (first, last) = ((0..=TOUCH_STEPS).find(touching)?, (0..=TOUCH_STEPS).rev().find(touching)?);
+        Some((at(first) - step / 2.0, at(last) + step / 2.0))
+    }
+
     /// The force at one point of the face, in Probe's axes (N).
     fn push(
         &self,
@@ -209,6 +233,24 @@ pub(crate) mod tests {
     fn in_the_air_nothing_pushes() {
         let skin = Skin::new(&SkinConfig::even(1.5), 1);
         assert_eq!(skin.press(&Table, &down(-0.0001), &Twist::zero()), Wrench::zero());
+    }
+
+    #[test]
+    fn what_touches_is_found_along_the_face() {
+        let skin = Skin::new(&SkinConfig::even(1.5), 1);
+        assert_eq!(skin.touched(&Table, &down(-0.0016)), None);
+        let (from, to) = skin.touched(&Table, &down(0.001)).unwrap();
+        assert!(from < -0.02 && to > 0.02);
+        let tilt = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 0.2);
+        // FRAMES: the same probe, turned about its own y: positive x goes out of the table's tissue.
+        let tilted =
+            down(0.0) * Pose::<Probe, Probe>::assume(Isometry3::from_parts(Vector3::zeros().into(), tilt));
+        let (from, to) = skin.touched(&Table, &tilted).unwrap();
+        // The face stands 1.5 mm over the tissue at 1.5 mm / sin(0.2) = 7.55 mm.
+        assert!(
+            (from + 0.00755).abs() < 0.001 && to > 0.02 || from < -0.02 && (to - 0.00755).abs() < 0.001,
+            "{from} {to}"
+        );
     }
 
     #[test]

@@ -9,6 +9,7 @@ use crate::knobs::Knobs;
 use crate::leg::LegConfig;
 use crate::phantom::PhantomConfig;
 use crate::skin::SkinConfig;
+use crate::ultrasound::ImagingConfig;
 
 /// A simulated cell. The default is a UR5e beside the table with a left leg on it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -103,18 +104,15 @@ pub struct MachineConfig {
     pub depth_mm: f64,
     /// Depth of the transmit focus (mm).
     pub focus_mm: f64,
-    /// Zoom: the window's top and height (mm); without it the picture is the whole depth.
+    /// Zoom: the window's top and height (mm), as wide as the array at most; without it the picture is the whole
+    /// depth.
     pub zoom: Option<ZoomConfig>,
-    /// Width of the picture (mm).
-    pub width_mm: f64,
-    /// Columns of the picture.
-    pub columns: usize,
-    /// Rows of the picture.
-    pub rows: usize,
     /// How far the calibration that the software knows is from the truth: place (mm), in a direction from the seed.
     pub calibration_error_mm: f64,
     /// And orientation (degrees).
     pub calibration_error_deg: f64,
+    /// How its pictures are formed.
+    pub imaging: ImagingConfig,
 }
 
 /// A zoom window.
@@ -136,11 +134,9 @@ impl Default for MachineConfig {
             depth_mm: 70.0,
             focus_mm: 45.0,
             zoom: Some(ZoomConfig { top_mm: 2.0, height_mm: 40.0 }),
-            width_mm: 40.0,
-            columns: 640,
-            rows: 480,
             calibration_error_mm: 0.2,
             calibration_error_deg: 0.2,
+            imaging: ImagingConfig::default(),
         }
     }
 }
@@ -182,6 +178,7 @@ impl CellConfig {
         within("skin.friction", skin.friction, 0.0, 2.0)?;
         within("skin.sliding_n_s_m", skin.sliding_n_s_m, 0.0, 1000.0)?;
         within("skin.pressing_n_s_m", skin.pressing_n_s_m, 0.0, 1000.0)?;
+        within("skin.gel_mm", skin.gel_mm, 0.0, 20.0)?;
         within("hand.length_mm", hand.length_mm, 5.0, 400.0)?;
         within("hand.start_mm", hand.start_mm, -20.0, 400.0)?;
         within("hand.speed_mm_s", hand.speed_mm_s, 1.0, 250.0)?;
@@ -198,14 +195,11 @@ impl MachineConfig {
         within("machine.latency_ms", self.latency_ms, 0.0, 2000.0)?;
         within("machine.depth_mm", self.depth_mm, 10.0, 300.0)?;
         within("machine.focus_mm", self.focus_mm, 1.0, 300.0)?;
-        within("machine.width_mm", self.width_mm, 5.0, 200.0)?;
-        within("machine.columns", self.columns as f64, 16.0, 4096.0)?;
-        within("machine.rows", self.rows as f64, 16.0, 4096.0)?;
         within("machine.calibration_error_mm", self.calibration_error_mm, 0.0, 20.0)?;
         within("machine.calibration_error_deg", self.calibration_error_deg, 0.0, 20.0)?;
         let Some(zoom) = self.zoom else { return Ok(()) };
         within("machine.zoom.top_mm", zoom.top_mm, 0.0, self.depth_mm)?;
-        within("machine.zoom.height_mm", zoom.height_mm, 1.0, self.depth_mm - zoom.top_mm)
+        within("machine.zoom.height_mm", zoom.height_mm, 3.0, self.depth_mm - zoom.top_mm)
     }
 }
 

@@ -3,6 +3,8 @@
 use probepath_robot::{ModelError, NoInverse};
 use thiserror::Error;
 
+use crate::ultrasound::ImagingError;
+
 /// Why a simulated cell could not be built.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -28,6 +30,9 @@ pub enum CellError {
         /// The cause, in words.
         why: String,
     },
+    /// The ultrasound machine's pictures cannot be made as machine.imaging says.
+    #[error("the cell's machine.imaging cannot be")]
+    Imaging(#[from] ImagingError),
     /// The start posture, over the leg, is not reached.
     #[error("the arm does not reach its start posture over the table")]
     Start(#[from] NoInverse),

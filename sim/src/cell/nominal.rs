@@ -3,11 +3,12 @@
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use probepath_frames::{Base, Flange, Image, Pose, Probe, Span, World};
 use probepath_robot::{Joints, Model, PANDA_URDF, UR5E_URDF};
-use probepath_us_capture::{PixelSpacing, Setting};
+use probepath_us_capture::Setting;
 
 use super::config::{ArmKind, CellConfig, MachineConfig, SubjectConfig};
 use super::{CellError, TICK};
 use crate::leg::Side;
+use crate::ultrasound::settings;
 
 /// What the software may know about the cell: what a real cell's file would say, errors included.
 #[derive(Clone, Debug, PartialEq)]
@@ -156,16 +157,9 @@ fn looking_down(place: Vector3<f64>) -> Pose<World, Probe> {
 impl MachineConfig {
     /// The setting that it describes.
     pub(crate) fn setting(&self) -> Setting {
-        let (top_mm, height_mm) =
-            self.zoom.map_or((0.0, self.depth_mm), |zoom| (zoom.top_mm, zoom.height_mm));
-        let (height_m, width_m) = (height_mm * 1e-3, self.width_mm * 1e-3);
-        Setting {
-            depth_m: self.depth_mm * 1e-3,
-            focus_m: self.focus_mm * 1e-3,
-            window_top_m: top_mm * 1e-3,
-            window_height_m: height_m,
-            window_width_m: width_m,
-            spacing: PixelSpacing { x_m: width_m / self.columns as f64, y_m: height_m / self.rows as f64 },
-        }
+        let (depth_m, focus_m) = (self.depth_mm * 1e-3, self.focus_mm * 1e-3);
+        let Some(zoom) = self.zoom else { return settings::whole_depth(depth_m, focus_m) };
+        let middle_m = (zoom.top_mm + zoom.height_mm / 2.0) * 1e-3;
+        settings::zoomed(depth_m, focus_m, zoom.height_mm * 1e-3, middle_m)
     }
 }

@@ -230,4 +230,9 @@ impl Scene {
         }
         Some(before.world_from_probe.interpolate(&self.moments.get(index + 1)?.world_from_probe, fraction))
     }
+
+    /// Where gel joins the face to the skin, along the probe's x (m).
+    pub(crate) fn touched(&self, world_from_probe: &Pose<World, Probe>) -> Option<(f64, f64)> {
+        self.skin.touched(&*self.subject, world_from_probe)
+    }
 }
