@@ -33,6 +33,12 @@ impl BlackBox {
         }
     }
 
+    /// Forgets everything; the room stays.
+    pub fn clear(&mut self) {
+        self.ticks.clear();
+        (self.oldest, self.seen) = (0, 0);
+    }
+
     /// The ticks kept, oldest first.
     pub fn ticks(&self) -> impl Iterator<Item = &Tick> {
         let (newer, older) = self.ticks.split_at(self.oldest.min(self.ticks.len()));

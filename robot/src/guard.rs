@@ -19,15 +19,20 @@ mod limits;
 mod trip;
 mod workspace;
 
-use probepath_frames::{Base, Point};
+use probepath_frames::{Base, Flange, Point, Pose, Probe};
 
-use crate::{Asked, Joints, LimitsError, MotionLimits, Operator, State};
+use crate::{Asked, BlackBox, Joints, LimitsError, Model, MotionLimits, Operator, State, Tick};
 pub use limits::GuardLimits;
 pub use trip::Trip;
 pub use workspace::{Plane, Workspace};
 
 /// Where the probe's origin is, given the joints: the model's forward kinematics with the tool on.
 pub type ProbePlace = Box<dyn Fn(&Joints) -> Point<Base> + Send>;
+
+/// Where a model's forward kinematics puts the probe's origin.
+pub fn probe_place(model: Model, flange_from_probe: Pose<Flange, Probe>) -> ProbePlace {
+    Box::new(move |joints| model.forward(joints) * flange_from_probe.origin())
+}
 
 /// What the guard makes of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,6 +84,7 @@ pub struct Guard {
     probe: Option<ProbePlace>,
     operator: Operator,
     phase: Phase,
+    black_box: BlackBox,
 }
 
 impl Guard {
@@ -90,7 +96,8 @@ impl Guard {
         motion.check()?;
         let phase = Phase::Armed(Ceiling(limits.force_hard_n));
         let workspace = Workspace::default();
-        Ok(Self { limits, motion, workspace, probe: None, operator: Operator::new(), phase })
+        let (operator, black_box) = (Operator::new(), BlackBox::default());
+        Ok(Self { limits, motion, workspace, probe: None, operator, phase, black_box })
     }
 
     /// Also watches where the probe is and how fast it moves.
@@ -133,6 +140,11 @@ impl Guard {
         &self.phase
     }
 
+    /// The last ticks of the motion that runs, or of the last one that ended in peace; a fault takes them with it.
+    pub const fn black_box(&self) -> &BlackBox {
+        &self.black_box
+    }
+
     /// Whether the operator asked to stop.
     pub fn is_stop_asked(&self) -> bool {
         self.operator.wish() == Asked::Stop
@@ -171,6 +183,7 @@ impl Guard {
             return Err(Trip::NotConfirmed);
         };
         self.fit(state)?;
+        self.black_box.clear();
         let probe = self.probe.as_ref().map(|place| place(&state.commanded));
         self.phase = Phase::Running(Watch { ceiling, last: *state, probe, stale_ns: 0 });
         Ok(())
@@ -214,6 +227,15 @@ impl Guard {
             Phase::Stopping(trip) => Phase::Stopped(trip),
             other => other,
         };
+    }
+
+    pub(crate) fn remember(&mut self, tick: &Tick) {
+        self.black_box.push(tick);
+    }
+
+    /// Hands the black box over with a fault.
+    pub(crate) fn take_black_box(&mut self) -> BlackBox {
+        std::mem::take(&mut self.black_box)
     }
 
     /// Something outside the guard went wrong (the arm's fault, a panic): a fresh confirmation is needed too.
@@ -312,6 +334,3 @@ impl Guard {
         })
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -18,8 +18,10 @@ mod run;
 
 pub use arm::{Arm, ArmFault, Command, Controller, State};
 pub use black_box::BlackBox;
-pub use contact::{ContactError, ContactLaw, ContactSettings};
-pub use guard::{Ceiling, Guard, GuardLimits, Phase, Plane, ProbePlace, Trip, Verdict, Watch, Workspace};
+pub use contact::{ContactError, ContactLaw, ContactSettings, TouchDown, TouchDownPhase, TouchDownSettings};
+pub use guard::{
+    Ceiling, Guard, GuardLimits, Phase, Plane, ProbePlace, Trip, Verdict, Watch, Workspace, probe_place,
+};
 pub use joints::{Joints, MAX_JOINTS, WrongJoints};
 pub use limits::{Limited, Limiter, LimitsError, MotionLimits};
 pub use model::{

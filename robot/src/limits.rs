@@ -12,7 +12,7 @@ pub(crate) mod axis;
 use probepath_frames::Span;
 use thiserror::Error;
 
-use crate::Joints;
+use crate::{Joints, Model};
 use axis::{Bounds, Motion};
 
 /// How far inside the limits the limiter stays, as a fraction: room for the rounding of the third difference of
@@ -83,6 +83,28 @@ pub enum LimitsError {
 }
 
 impl MotionLimits {
+    /// A model's ranges and speeds, with accelerations and jerks, which no URDF has.
+    ///
+    /// # Errors
+    /// As [`check`](Self::check).
+    pub fn of_model(model: &Model, acceleration: Joints, jerk: Joints) -> Result<Self, LimitsError> {
+        let joints = model.joints();
+        let mut limits = Self {
+            lower: Joints::zeros(joints),
+            upper: Joints::zeros(joints),
+            velocity: Joints::zeros(joints),
+            acceleration,
+            jerk,
+        };
+        for (joint, limit) in model.limits().iter().take(limits.joints()).enumerate() {
+            limits.lower[joint] = limit.lower;
+            limits.upper[joint] = limit.upper;
+            limits.velocity[joint] = limit.velocity;
+        }
+        limits.check()?;
+        Ok(limits)
+    }
+
     /// How many joints.
     pub const fn joints(&self) -> usize {
         self.velocity.len()

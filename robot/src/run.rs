@@ -112,7 +112,6 @@ struct Motion<'a> {
     guard: &'a mut Guard,
     observer: &'a mut dyn Observer,
     limiter: Limiter,
-    black_box: BlackBox,
     state: State,
     dt: f64,
     ticks: u64,
@@ -126,7 +125,6 @@ impl<'a> Motion<'a> {
         guard: &'a mut Guard,
         observer: &'a mut dyn Observer,
     ) -> Result<Self, Box<RunError>> {
-        let black_box = BlackBox::default();
         let refused = |reason, last| RunError { reason, last, at_rest: true, black_box: BlackBox::new(1) };
         let state = rest(arm).map_err(|reason| Box::new(refused(reason, None)))?;
         guard.begin(&state).map_err(|trip| Box::new(refused(StopReason::Guard(trip), Some(state))))?;
@@ -135,7 +133,7 @@ impl<'a> Motion<'a> {
             guard.end();
             Box::new(refused(StopReason::Limits(error), Some(state)))
         })?;
-        Ok(Self { arm, guard, observer, limiter, black_box, state, dt, ticks: 0, observer_well: true })
+        Ok(Self { arm, guard, observer, limiter, state, dt, ticks: 0, observer_well: true })
     }
 
     /// The loop.
@@ -183,7 +181,7 @@ impl<'a> Motion<'a> {
         let verdict = if braking { Verdict::Fine } else { self.guard.judge(&self.state, self.dt) };
         let tick = Tick { index: self.ticks, wanted, command, changed, state: self.state, verdict, braking };
         self.ticks += 1;
-        self.black_box.push(&tick);
+        self.guard.remember(&tick);
         let wish = self.tell(&tick)?;
         match verdict {
             Verdict::Stop(trip) => Err(StopReason::Guard(trip)),
@@ -219,7 +217,12 @@ impl<'a> Motion<'a> {
         };
         self.guard.stop(if let StopReason::Guard(trip) = reason { trip } else { Trip::Fault });
         self.guard.end();
-        Err(Box::new(RunError { reason, last: Some(self.state), at_rest, black_box: self.black_box }))
+        Err(Box::new(RunError {
+            reason,
+            last: Some(self.state),
+            at_rest,
+            black_box: self.guard.take_black_box(),
+        }))
     }
 
     /// To rest, as hard as the limits allow. The observer is told, and can no longer ask for anything.
@@ -261,3 +264,6 @@ fn message(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().copied();
     text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("without words").into()
 }
+
+#[cfg(test)]
+mod tests;

@@ -152,3 +152,96 @@ fn planned(start: &Joints, target: &Joints, limits: &MotionLimits) -> Result<Tra
         Err(error) => Err(NoMove::Planner { why: error.to_string() }),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand_chacha::ChaCha8Rng;
+    use rand_chacha::rand_core::{Rng, SeedableRng};
+
+    use super::*;
+    use crate::Limiter;
+
+    const PERIOD: Span = Span::from_milliseconds(2);
+
+    fn between(rng: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
+        low + (high - low) * (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn some(rng: &mut ChaCha8Rng, low: f64, high: f64) -> Joints {
+        let mut joints = Joints::zeros(6);
+        joints.as_mut_slice().iter_mut().for_each(|value| *value = between(rng, low, high));
+        joints
+    }
+
+    fn problem(rng: &mut ChaCha8Rng) -> (Joints, Joints, MotionLimits) {
+        let limits = MotionLimits {
+            lower: Joints::splat(6, -3.0),
+            upper: Joints::splat(6, 3.0),
+            velocity: some(rng, 0.3, 3.2),
+            acceleration: some(rng, 1.0, 15.0),
+            jerk: some(rng, 30.0, 1000.0),
+        };
+        let start = some(rng, -3.0, 3.0);
+        let reach = if rng.next_u32().is_multiple_of(4) { 0.01 } else { 6.0 };
+        let target = start.zip(&some(rng, -reach, reach), |from, by| (from + by).clamp(-3.0, 3.0));
+        (start, target, limits)
+    }
+
+    #[test]
+    fn a_thousand_moves_never_need_the_limiter_and_arrive_together_at_rest() {
+        let mut rng = ChaCha8Rng::seed_from_u64(30);
+        for case in 0..1000 {
+            let (start, target, limits) = problem(&mut rng);
+            let mut plan = PointToPoint::plan(&start, &target, &limits, PERIOD).unwrap();
+            let mut limiter = Limiter::at_rest(limits, PERIOD, start).unwrap();
+            let state = crate::State {
+                tick: 0,
+                stamp: probepath_frames::Stamp::ZERO,
+                position: start,
+                velocity: start,
+                commanded: start,
+                wrench: probepath_frames::Wrench::zero(),
+                guiding: false,
+            };
+            let mut arrived = None;
+            for tick in 0.. {
+                let Some(Command::Position(next)) = plan.step(&state) else { break };
+                let limited = limiter.limit(&next).unwrap();
+                assert!(limited.changed <= 0.0, "case {case}, tick {tick}: changed by {:e}", limited.changed);
+                if arrived.is_none() && next.zip(&target, |a, b| a - b).largest() < 1e-12 {
+                    arrived = Some(tick);
+                }
+            }
+            assert_eq!(*limiter.position(), target);
+            assert!(limiter.is_at_rest() && arrived.is_some());
+        }
+    }
+
+    #[test]
+    fn a_move_is_as_fast_as_its_slowest_joint_allows() {
+        // Rest to rest over d with limits that are all reached: d/v + v/a + a/j.
+        let mut limits = problem(&mut ChaCha8Rng::seed_from_u64(31)).2;
+        limits.velocity = Joints::splat(6, 1.0);
+        limits.acceleration = Joints::splat(6, 4.0);
+        limits.jerk = Joints::splat(6, 80.0);
+        let mut target = Joints::splat(6, 0.1);
+        target[3] = 2.0;
+        let plan = PointToPoint::plan(&Joints::zeros(6), &target, &limits, PERIOD).unwrap();
+        let best = 2.0 / 1.0 + 1.0 / 4.0 + 4.0 / 80.0;
+        assert!((plan.duration_s() - best).abs() < 1e-3 * best, "{} s, best {best} s", plan.duration_s());
+    }
+
+    #[test]
+    fn a_move_out_of_range_or_of_no_number_is_refused_with_its_joint() {
+        let (start, _, limits) = problem(&mut ChaCha8Rng::seed_from_u64(32));
+        let mut target = start;
+        target[4] = 3.5;
+        let refused = PointToPoint::plan(&start, &target, &limits, PERIOD).unwrap_err();
+        assert!(matches!(refused, NoMove::OutOfRange { joint: 4, .. }), "{refused}");
+        target[4] = f64::NAN;
+        let refused = PointToPoint::plan(&start, &target, &limits, PERIOD).unwrap_err();
+        assert!(matches!(refused, NoMove::Limits(LimitsError::NotFinite { joint: 4, .. })), "{refused}");
+        let refused = PointToPoint::plan(&start, &Joints::zeros(5), &limits, PERIOD).unwrap_err();
+        assert!(matches!(refused, NoMove::Limits(LimitsError::Joints { found: 5, joints: 6 })), "{refused}");
+    }
+}

@@ -1,0 +1,185 @@
+//! The law on a plant that knows nothing of it: a spring of changing stiffness under a moving surface, behind a servo.
+
+use probepath_frames::Span;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+
+use super::*;
+
+const PERIOD: Span = Span::from_milliseconds(2);
+const DT: f64 = 0.002;
+/// The path's speed (m/s).
+const SPEED: f64 = 0.01;
+const WANTED: f64 = 5.0;
+
+fn between(rng: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
+    low + (high - low) * (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+}
+
+/// A normal number, as the sum of twelve even ones.
+fn normal(rng: &mut ChaCha8Rng) -> f64 {
+    (0..12).map(|_| between(rng, 0.0, 1.0)).sum::<f64>() - 6.0
+}
+
+/// A skin: bumps of up to ±5 mm over 40 to 100 mm, 0.3 to 3 N/mm changing every 30 to 60 mm.
+struct Skin {
+    waves: [(f64, f64, f64); 2],
+    stiffness: Vec<f64>,
+    knot: f64,
+}
+
+impl Skin {
+    fn new(rng: &mut ChaCha8Rng) -> Self {
+        let (height, share) = (between(rng, 0.003, 0.005), between(rng, 0.0, 1.0));
+        let waves = [height * share, height * (1.0 - share)]
+            .map(|height| (height, between(rng, 0.04, 0.1), between(rng, 0.0, std::f64::consts::TAU)));
+        let stiffness = (0..20).map(|_| 300.0 * 10f64.powf(between(rng, 0.0, 1.0))).collect();
+        Self { waves, stiffness, knot: between(rng, 0.03, 0.06) }
+    }
+
+    fn height(&self, x: f64) -> f64 {
+        self.waves
+            .iter()
+            .map(|(height, long, phase)| height * (std::f64::consts::TAU * x / long + phase).sin())
+            .sum()
+    }
+
+    fn stiffness(&self, x: f64) -> f64 {
+        let knot = (x / self.knot).min(18.0);
+        let share = (1.0 - (std::f64::consts::PI * knot.fract()).cos()) / 2.0;
+        let at = knot as usize;
+        (self.stiffness[at].ln() * (1.0 - share) + self.stiffness[at + 1].ln() * share).exp()
+    }
+}
+
+/// The arm and its sensor: two ticks and a servo lag of 6 to 16 ms, 0.05 to 0.2 N of noise, a drifting zero.
+struct Plant {
+    rng: ChaCha8Rng,
+    delayed: [f64; 3],
+    at: f64,
+    lag: f64,
+    noise: f64,
+    drift: f64,
+}
+
+impl Plant {
+    fn new(mut rng: ChaCha8Rng) -> Self {
+        let (lag, noise) = (between(&mut rng, 0.006, 0.016), between(&mut rng, 0.05, 0.2));
+        Self { rng, delayed: [0.0; 3], at: 0.0, lag, noise, drift: 0.0 }
+    }
+
+    fn follow(&mut self, offset: f64) {
+        self.delayed = [offset, self.delayed[0], self.delayed[1]];
+        self.at += (self.delayed[2] - self.at) * (1.0 - (-DT / self.lag).exp());
+    }
+
+    fn measured(&mut self, force: f64) -> f64 {
+        self.drift += 3e-5 * normal(&mut self.rng);
+        force + self.drift + self.noise * normal(&mut self.rng)
+    }
+}
+
+struct Held {
+    rms: f64,
+    overshoot: f64,
+    largest_jerk: f64,
+}
+
+/// Touches down, then follows 150 mm of skin.
+fn scan(seed: u64) -> Held {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let skin = Skin::new(&mut rng);
+    let mut plant = Plant::new(rng);
+    let law = ContactLaw::new(ContactSettings::default(), PERIOD).unwrap();
+    let mut down = TouchDown::new(law, TouchDownSettings::default(), WANTED, PERIOD).unwrap();
+    let gap = 0.005;
+    let (mut x, mut force, mut squares, mut count) = (0.0, 0.0, 0.0, 0.0);
+    let mut held = Held { rms: 0.0, overshoot: 0.0, largest_jerk: 0.0 };
+    let mut offsets = [0.0; 4];
+    for tick in 0..10_000 {
+        let measured = plant.measured(force);
+        let offset = down.step(measured);
+        plant.follow(offset);
+        let surface = gap + skin.height(x) - skin.height(0.0);
+        force = (skin.stiffness(x) * (plant.at - surface)).max(0.0);
+        if down.phase() == TouchDownPhase::Held {
+            x += SPEED * DT;
+            squares += (force - WANTED).powi(2);
+            count += 1.0;
+        } else {
+            held.overshoot = held.overshoot.max(force - WANTED);
+        }
+        offsets = [offset, offsets[0], offsets[1], offsets[2]];
+        let jerk = (offsets[0] - 3.0 * offsets[1] + 3.0 * offsets[2] - offsets[3]) / DT.powi(3);
+        held.largest_jerk = held.largest_jerk.max(jerk.abs());
+        if x > 0.15 {
+            break;
+        }
+        assert!(tick < 9_999 || x > 0.05, "skin {seed}: only {x} m");
+    }
+    held.rms = (squares / f64::max(count, 1.0)).sqrt();
+    held
+}
+
+#[test]
+fn a_thousand_skins_are_held_within_three_tenths_of_a_newton_and_touched_within_one() {
+    let all: Vec<Held> = (0..1000).map(scan).collect();
+    let worst = all.iter().map(|held| held.rms).fold(0.0, f64::max);
+    let overshoot = all.iter().map(|held| held.overshoot).fold(0.0, f64::max);
+    let jerk = all.iter().map(|held| held.largest_jerk).fold(0.0, f64::max);
+    let mean = all.iter().map(|held| held.rms).sum::<f64>() / all.len() as f64;
+    println!("rms mean {mean:.3} worst {worst:.3} N, overshoot {overshoot:.3} N, jerk {jerk:.2} m/s³");
+    assert!(worst <= 0.3, "{worst} N RMS");
+    assert!(overshoot <= 1.0, "{overshoot} N over");
+    assert!(jerk <= ContactSettings::default().jerk_m_s3 * (1.0 + 1e-6), "{jerk} m/s³");
+}
+
+#[test]
+fn a_force_far_too_high_lifts_at_full_speed_and_keeps_every_bound() {
+    let settings = ContactSettings::default();
+    let mut law = ContactLaw::new(settings, PERIOD).unwrap();
+    let mut before = 0.0;
+    for tick in 0..3000 {
+        let offset = law.step(12.0, WANTED);
+        assert!((offset - before) / DT >= -settings.speed_m_s - 1e-9);
+        assert!(offset >= settings.lowest_m - 1e-12);
+        before = offset;
+        if tick == 200 {
+            assert!(law.speed_m_s() < -0.029, "{}", law.speed_m_s());
+        }
+    }
+    assert!((before - settings.lowest_m).abs() < 1e-4);
+}
+
+#[test]
+fn after_a_long_time_at_the_end_it_comes_back_at_once() {
+    let mut law = ContactLaw::new(ContactSettings::default(), PERIOD).unwrap();
+    for _ in 0..20_000 {
+        law.step(0.0, WANTED);
+    }
+    let end = law.offset_m();
+    for _ in 0..250 {
+        law.step(WANTED + 2.0, WANTED);
+    }
+    assert!(law.offset_m() < end - 1e-3, "wound up: {} after {end}", law.offset_m());
+}
+
+#[test]
+fn no_skin_is_said_and_not_searched_for_ever() {
+    let law = ContactLaw::new(ContactSettings::default(), PERIOD).unwrap();
+    let mut down = TouchDown::new(law, TouchDownSettings::default(), WANTED, PERIOD).unwrap();
+    for _ in 0..4000 {
+        down.step(0.05);
+    }
+    assert_eq!(down.phase(), TouchDownPhase::NoContact);
+}
+
+#[test]
+fn settings_and_forces_that_are_no_numbers_are_refused_or_ignored() {
+    let bad = ContactSettings { gain: f64::NAN, ..ContactSettings::default() };
+    assert_eq!(ContactLaw::new(bad, PERIOD).unwrap_err().what, "gain");
+    let mut law = ContactLaw::new(ContactSettings::default(), PERIOD).unwrap();
+    law.step(WANTED, WANTED);
+    assert!(law.step(f64::NAN, WANTED).is_finite());
+    assert!((law.force_n() - WANTED).abs() < 1e-9);
+}

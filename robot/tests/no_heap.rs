@@ -1,0 +1,123 @@
+//! No step touches the heap: not a controller's, not the limits', the guard's, the black box's, nor the loop's own.
+//!
+//! The allocator ends the process at the first allocation inside [`assert_no_alloc`].
+
+use assert_no_alloc::{AllocDisabler, assert_no_alloc};
+use probepath_frames::nalgebra::{Isometry3, Vector3};
+use probepath_frames::{Base, Direction, Flange, Point, Pose, Probe, Span, Stamp, Wrench};
+use probepath_robot::*;
+
+#[global_allocator]
+static ALLOCATOR: AllocDisabler = AllocDisabler;
+
+const PERIOD: Span = Span::from_milliseconds(2);
+
+/// Does what it is told at once, and presses a little.
+struct Ideal(State);
+
+impl Ideal {
+    fn at(joints: Joints) -> Self {
+        Self(State {
+            tick: 0,
+            stamp: Stamp::ZERO,
+            position: joints,
+            velocity: Joints::zeros(joints.len()),
+            commanded: joints,
+            wrench: Wrench::<Probe>::new(Vector3::new(0.1, 0.0, -1.0), Vector3::zeros()),
+            guiding: false,
+        })
+    }
+}
+
+impl Arm for Ideal {
+    fn exchange(&mut self, command: &Command) -> Result<State, ArmFault> {
+        let state = &mut self.0;
+        if let Command::Position(position) = command {
+            state.velocity = position.zip(&state.position, |now, before| (now - before) / PERIOD.seconds());
+            (state.position, state.commanded) = (*position, *position);
+        }
+        state.tick += 1;
+        state.stamp = state.stamp + PERIOD;
+        Ok(*state)
+    }
+
+    fn period(&self) -> Span {
+        PERIOD
+    }
+
+    fn joints(&self) -> usize {
+        self.0.position.len()
+    }
+}
+
+fn limits(model: &Model) -> MotionLimits {
+    let joints = model.joints();
+    MotionLimits::of_model(model, Joints::splat(joints, 5.0), Joints::splat(joints, 100.0)).unwrap()
+}
+
+fn guard(model: &Model) -> Guard {
+    // FRAMES: a probe of 200 mm, straight out of the flange.
+    let flange_from_probe = Pose::<Flange, Probe>::assume(Isometry3::translation(0.0, 0.0, 0.2));
+    let table = Plane { through: Point::<Base>::new(0.0, 0.0, -2.0), inward: Direction::z() };
+    let guard_limits = GuardLimits { free_speed_m_s: 5.0, ..GuardLimits::default() };
+    Guard::new(guard_limits, limits(model))
+        .unwrap()
+        .within(Workspace::new().and(table), probe_place(model.clone(), flange_from_probe))
+        .listening_to(Operator::new())
+}
+
+/// Runs the whole loop, brake and end included, with the allocator shut.
+fn run_without_heap(model: &Model, controller: &mut dyn Controller, observer: &mut dyn Observer) -> Finished {
+    let (mut arm, mut guard) = (Ideal::at(Joints::splat(model.joints(), 0.3)), guard(model));
+    let finished = assert_no_alloc(|| run(&mut arm, controller, &mut guard, observer));
+    let finished = finished.unwrap();
+    assert!(finished.ticks > 100, "only {} ticks were watched", finished.ticks);
+    finished
+}
+
+#[test]
+fn the_loop_and_every_motion_touch_no_heap() {
+    for model in [Model::ur5e(), Model::seven_joint()] {
+        let start = Joints::splat(model.joints(), 0.3);
+        let target = Joints::splat(model.joints(), 0.7);
+        let plan = || PointToPoint::plan(&start, &target, &limits(&model), PERIOD).unwrap();
+        // More ticks than the black box holds, so that it goes round.
+        run_without_heap(&model, &mut Hold::ticks(3000), &mut ());
+        run_without_heap(&model, &mut plan(), &mut ());
+        run_without_heap(&model, &mut Switch(plan(), 150), &mut ());
+        let mut last = None;
+        let mut watch = |tick: &Tick| {
+            last = Some(*tick);
+            Wish::GoOn
+        };
+        run_without_heap(&model, &mut plan(), &mut watch);
+    }
+}
+
+/// Turns to a brake in full motion.
+struct Switch(PointToPoint, u64);
+
+impl Controller for Switch {
+    fn step(&mut self, state: &State) -> Option<Command> {
+        self.1 = self.1.checked_sub(1)?;
+        if self.1 > 50 { self.0.step(state) } else { Brake::default().step(state) }
+    }
+}
+
+#[test]
+fn the_contact_law_and_the_limits_at_a_wall_touch_no_heap() {
+    let law = ContactLaw::new(ContactSettings::default(), PERIOD).unwrap();
+    let mut down = TouchDown::new(law, TouchDownSettings::default(), 5.0, PERIOD).unwrap();
+    let model = Model::ur5e();
+    let mut limiter = Limiter::at_rest(limits(&model), PERIOD, Joints::zeros(6)).unwrap();
+    assert_no_alloc(|| {
+        let mut force = 0.0;
+        for _ in 0..5000 {
+            let offset = down.step(force);
+            force = (1000.0 * (offset - 0.01)).max(0.0);
+            let wall = limiter.position().map(|now| now + 0.1);
+            limiter.limit(&wall).unwrap();
+        }
+    });
+    assert_eq!(down.phase(), TouchDownPhase::Held);
+}
