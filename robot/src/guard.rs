@@ -47,6 +47,10 @@ pub enum Verdict {
 
 /// Where the guard is in its diagram.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "there is one, in the guard; a box would touch the heap at every tick"
+)]
 pub enum Phase {
     /// A motion may begin.
     Armed(Ceiling),

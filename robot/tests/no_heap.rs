@@ -2,6 +2,8 @@
 //!
 //! The allocator ends the process at the first allocation inside [`assert_no_alloc`].
 
+#![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
+
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use probepath_frames::nalgebra::{Isometry3, Vector3};
 use probepath_frames::{Base, Direction, Flange, Point, Pose, Probe, Span, Stamp, Wrench};
@@ -55,6 +57,12 @@ fn limits(model: &Model) -> MotionLimits {
     MotionLimits::of_model(model, Joints::splat(joints, 5.0), Joints::splat(joints, 100.0)).unwrap()
 }
 
+/// A share of the way from each joint's lower limit to its upper.
+fn between(model: &Model, share: f64) -> Joints {
+    let limits = limits(model);
+    limits.lower.zip(&limits.upper, |lower, upper| lower + (upper - lower) * share)
+}
+
 fn guard(model: &Model) -> Guard {
     // FRAMES: a probe of 200 mm, straight out of the flange.
     let flange_from_probe = Pose::<Flange, Probe>::assume(Isometry3::translation(0.0, 0.0, 0.2));
@@ -68,7 +76,7 @@ fn guard(model: &Model) -> Guard {
 
 /// Runs the whole loop, brake and end included, with the allocator shut.
 fn run_without_heap(model: &Model, controller: &mut dyn Controller, observer: &mut dyn Observer) -> Finished {
-    let (mut arm, mut guard) = (Ideal::at(Joints::splat(model.joints(), 0.3)), guard(model));
+    let (mut arm, mut guard) = (Ideal::at(between(model, 0.4)), guard(model));
     let finished = assert_no_alloc(|| run(&mut arm, controller, &mut guard, observer));
     let finished = finished.unwrap();
     assert!(finished.ticks > 100, "only {} ticks were watched", finished.ticks);
@@ -78,8 +86,7 @@ fn run_without_heap(model: &Model, controller: &mut dyn Controller, observer: &m
 #[test]
 fn the_loop_and_every_motion_touch_no_heap() {
     for model in [Model::ur5e(), Model::seven_joint()] {
-        let start = Joints::splat(model.joints(), 0.3);
-        let target = Joints::splat(model.joints(), 0.7);
+        let (start, target) = (between(&model, 0.4), between(&model, 0.6));
         let plan = || PointToPoint::plan(&start, &target, &limits(&model), PERIOD).unwrap();
         // More ticks than the black box holds, so that it goes round.
         run_without_heap(&model, &mut Hold::ticks(3000), &mut ());

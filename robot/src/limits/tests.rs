@@ -30,13 +30,17 @@ fn some_limits(rng: &mut ChaCha8Rng) -> MotionLimits {
 
 /// The check that a reader of an exam makes, from the commanded positions alone.
 fn check(limits: &MotionLimits, dt: f64, rows: &[Joints]) {
-    for rows in rows.windows(4) {
-        for joint in 0..limits.joints() {
-            let [q0, q1, q2, q3] = [rows[0][joint], rows[1][joint], rows[2][joint], rows[3][joint]];
-            let v = [(q1 - q0) / dt, (q2 - q1) / dt, (q3 - q2) / dt];
+    for joint in 0..limits.joints() {
+        let positions: Vec<f64> = rows.iter().map(|row| row[joint]).collect();
+        for q in positions.windows(4) {
+            let v = [(q[1] - q[0]) / dt, (q[2] - q[1]) / dt, (q[3] - q[2]) / dt];
             let a = [(v[1] - v[0]) / dt, (v[2] - v[1]) / dt];
             let j = (a[1] - a[0]) / dt;
-            assert!(q3 >= limits.lower[joint] - 1e-9 && q3 <= limits.upper[joint] + 1e-9, "position {q3}");
+            assert!(
+                q[3] >= limits.lower[joint] - 1e-9 && q[3] <= limits.upper[joint] + 1e-9,
+                "position {}",
+                q[3]
+            );
             assert!(v[2].abs() <= limits.velocity[joint] * (1.0 + 1e-9), "velocity {}", v[2]);
             assert!(a[1].abs() <= limits.acceleration[joint] * (1.0 + 1e-9), "acceleration {}", a[1]);
             assert!(j.abs() <= limits.jerk[joint] * (1.0 + 1e-9), "jerk {j} of {}", limits.jerk[joint]);

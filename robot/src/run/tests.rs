@@ -116,15 +116,13 @@ fn there() -> PointToPoint {
 
 /// Every command of the arm within the limits, as read back from its rows.
 fn check(arm: &TestArm) {
-    let dt = PERIOD.seconds();
-    let limits = limits();
-    let rows: Vec<Joints> = arm.rows.iter().map(|(_, state)| state.commanded).collect();
-    for rows in rows.windows(4) {
-        for joint in 0..2 {
-            let [q0, q1, q2, q3] = [rows[0][joint], rows[1][joint], rows[2][joint], rows[3][joint]];
-            assert!((q3 - q2).abs() / dt <= limits.velocity[joint]);
-            assert!((q3 - 2.0 * q2 + q1).abs() / dt.powi(2) <= limits.acceleration[joint]);
-            let jerk = (((q3 - q2) - (q2 - q1)) - ((q2 - q1) - (q1 - q0))).abs() / dt.powi(3);
+    let (dt, limits) = (PERIOD.seconds(), limits());
+    for joint in 0..2 {
+        let positions: Vec<f64> = arm.rows.iter().map(|(_, state)| state.commanded[joint]).collect();
+        for q in positions.windows(4) {
+            let jerk = (((q[3] - q[2]) - (q[2] - q[1])) - ((q[2] - q[1]) - (q[1] - q[0]))).abs() / dt.powi(3);
+            assert!((q[3] - q[2]).abs() / dt <= limits.velocity[joint]);
+            assert!((q[3] - 2.0 * q[2] + q[1]).abs() / dt.powi(2) <= limits.acceleration[joint]);
             assert!(jerk <= limits.jerk[joint], "{jerk}");
         }
     }
