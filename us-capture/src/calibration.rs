@@ -139,7 +139,7 @@ impl Calibration {
         Ok(calibration)
     }
 
-    /// The TOML text that [`Calibration::from_toml`] reads back equal.
+    /// The TOML text that [`Calibration::from_toml`] reads back, lengths to the last digit of a double.
     ///
     /// # Errors
     /// When a number is one that no calibration can have.
@@ -242,7 +242,8 @@ impl SettingMm {
     }
 }
 
-/// Metres as millimetres that read back to the same metres: the shortest decimal, or the product's neighbour.
+/// Metres as millimetres that read back to the same metres where any double does: 0.07 m is 70 mm, though the product
+/// of the doubles is 70.00000000000001.
 fn mm(metres: f64) -> f64 {
     let product = metres * 1e3;
     let neighbours = [product, product.next_up(), product.next_down()];

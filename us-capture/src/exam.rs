@@ -75,3 +75,6 @@ pub use reader::{Ending, ExamEvent, ExamReader};
 pub use record::{Attachment, Event, ExamHeader, Level, ROW_ROOM, Row, TickRecord};
 pub use whole::Exam;
 pub use writer::{ExamWriter, Lost, Pace};
+
+#[cfg(test)]
+mod tests;

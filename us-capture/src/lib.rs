@@ -4,6 +4,7 @@
 
 mod bscan;
 mod calibration;
+mod capture;
 pub mod exam;
 mod pixel_map;
 pub mod plus;
@@ -12,5 +13,6 @@ mod source;
 
 pub use bscan::{BScan, BadBScan, PixelSpacing, PlacedBScan, Setting};
 pub use calibration::{BadCalibration, Calibration, CalibrationError};
+pub use capture::{Capture, CaptureError, Counts, Keeping};
 pub use pixel_map::{BadPixelMap, PixelMap};
 pub use source::{BScanSource, SourceFault};

@@ -84,7 +84,8 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(2000))]
 
     #[test]
-    fn lengths_go_through_millimetres_to_the_bit(metres in 1e-6..1.0f64) {
-        prop_assert_eq!((mm(metres) / 1e3).to_bits(), metres.to_bits());
+    fn lengths_go_through_millimetres_to_the_last_bit_but_one(metres in 1e-6..1.0f64) {
+        // Some doubles are no double's thousandth.
+        prop_assert!((mm(metres) / 1e3 - metres).abs() <= metres * f64::EPSILON);
     }
 }

@@ -89,7 +89,7 @@ impl ExamWriter {
         Self::with_room(sink, header, pace, QUEUE)
     }
 
-    fn with_room<W: Write + Send + 'static>(
+    pub(crate) fn with_room<W: Write + Send + 'static>(
         sink: W,
         header: &ExamHeader,
         pace: Pace,
