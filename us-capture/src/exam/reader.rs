@@ -23,10 +23,6 @@ const RECORD_HEAD: u64 = 9;
 
 /// Something that an exam holds, in the order it was written.
 #[derive(Clone, Debug, PartialEq)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "ticks are nearly all of the events; a box for each would cost more"
-)]
 pub enum ExamEvent {
     /// A tick of the control loop.
     Tick(TickRecord),
