@@ -46,15 +46,25 @@ pub enum NoInverse {
         /// Which input.
         what: &'static str,
     },
-    /// No posture reaches it, whatever the limits.
+    /// The place is beyond the arm in every orientation, whatever the limits.
     #[error(
-        "out of reach: the nearest posture found is {:.1} mm and {:.1} degrees short; bring the pose nearer to the base",
-        short_m * 1000.0, short_rad.to_degrees()
+        "out of reach by {:.3} mm, in whatever orientation; bring the pose nearer to the base",
+        short_m * 1000.0
     )]
     OutOfReach {
-        /// Distance from the pose's origin to the nearest that was reached (m).
+        /// From the pose's origin to the nearest place that was reached (m).
         short_m: f64,
-        /// Angle there (rad).
+    },
+    /// The place is within reach, and not in this orientation, whatever the limits.
+    #[error(
+        "the place is within reach and not in this orientation: the nearest posture found is {:.3} mm and {:.3} degrees \
+         off; turn the tool, or bring the pose nearer to the base",
+        short_m * 1000.0, short_rad.to_degrees()
+    )]
+    NotSoOriented {
+        /// What is left of the distance at the posture that comes closest (m).
+        short_m: f64,
+        /// What is left of the angle there (rad).
         short_rad: f64,
     },
     /// Postures reach it, and each that was found is outside the limits of a joint.
@@ -88,17 +98,20 @@ pub enum NoInverse {
     },
 }
 
-/// A pose is reached when neither its place (m) nor its angle (rad) is off by more.
+/// A search for a pose ends when neither its place (m) nor its angle (rad) is off by more.
 const REACHED: f64 = 1e-12;
 
-/// Keeps a step finite at a singularity; the square of a singular value (1e-5) that no arm should work at.
-const LEAST_DAMPING: f64 = 1e-10;
+/// A pose counts as reached below this (m, rad): at a singularity the last digits do not come.
+const ACCEPTED: f64 = 1e-9;
+
+/// Keeps a step finite at a singularity. There the error is the square of the joints' distance, and stalls near this.
+const LEAST_DAMPING: f64 = 1e-13;
 
 /// A search whose steps are shorter than this (rad, m) has come to rest.
 const AT_REST: f64 = 1e-10;
 
-/// Nearer than this (m, rad) to a pose at a singular posture, the singularity is named and not the distance.
-const CLOSE: f64 = 5e-3;
+/// Nearer than this (m, rad) at a singular posture, the singularity is the cause and not the distance.
+const CLOSE: f64 = 1e-5;
 
 /// Below this smallest singular value an arm is at a singularity.
 const SINGULAR: f64 = 1e-2;
@@ -119,6 +132,13 @@ enum Within {
     Anything,
 }
 
+/// What a search is after: the pose, or its place in whatever orientation.
+#[derive(Clone, Copy, PartialEq)]
+enum After {
+    Pose,
+    Place,
+}
+
 /// Where a search ended.
 struct Found {
     joints: Joints,
@@ -137,8 +157,9 @@ struct Search<'a> {
 }
 
 impl Model {
-    /// Joints that put the tool at `base_from_tool` to 1e-12, within the limits; among those that were found the
-    /// nearest to `reference`. The same question gives the same answer.
+    /// Joints that put the tool at `base_from_tool`, within the limits: to 1e-12 (m and rad), at a singularity to 1e-9.
+    /// The search begins at `reference`; only if that leads nowhere it begins elsewhere, and takes the solution nearest
+    /// to `reference`. The same question gives the same answer.
     ///
     /// Damped least squares with the damping of Sugihara (2011), which goes with the error and so is as quick as
     /// Newton at the end and steady where there is no solution; joints at a limit are held there, and what freedom
@@ -191,13 +212,14 @@ impl Search<'_> {
     /// A solution within limits, from one posture: first the pose by itself, then, with joints to spare, the pull to
     /// the reference.
     fn solve(&self, start: &Joints) -> Option<Joints> {
-        let found = self.descend(start, Within::Limits, 0.0);
-        if !within(&found.motion, REACHED) {
+        let found = self.descend(start, Within::Limits, After::Pose, 0.0);
+        if !within(&found.motion, ACCEPTED) {
             return None;
         }
         let found = self.unwound(&found.joints);
-        let pulled = self.descend(&found, Within::Limits, PULL);
-        let better = within(&pulled.motion, REACHED) && self.distance(&pulled.joints) < self.distance(&found);
+        let pulled = self.descend(&found, Within::Limits, After::Pose, PULL);
+        let better =
+            within(&pulled.motion, ACCEPTED) && self.distance(&pulled.joints) < self.distance(&found);
         Some(if better { pulled.joints } else { found })
     }
 
@@ -207,12 +229,16 @@ impl Search<'_> {
 
     /// Goes downhill from a posture until the pose is reached and the pull to the reference has come to rest, or the
     /// search has, or the steps are used up.
-    fn descend(&self, start: &Joints, bounds: Within, pull: f64) -> Found {
+    fn descend(&self, start: &Joints, bounds: Within, after: After, pull: f64) -> Found {
         let pull = if self.model.joints() > 6 { pull } else { 0.0 };
         let mut found = Found { joints: self.clamped(start, bounds), motion: Vector6::repeat(f64::INFINITY) };
         for _ in 0..self.options.steps {
-            let reach = self.model.reach(&found.joints, &self.tool);
+            let mut reach = self.model.reach(&found.joints, &self.tool);
             found.motion = missing(&reach, &self.goal, &self.goal_rotation);
+            if after == After::Place {
+                found.motion.fixed_rows_mut::<3>(3).fill(0.0);
+                reach.jacobian.matrix.fixed_rows_mut::<3>(3).fill(0.0);
+            }
             if pull <= 0.0 && within(&found.motion, REACHED) {
                 break;
             }
@@ -295,10 +321,8 @@ impl Search<'_> {
 
     /// After every posture failed: the cause, looked for again without the limits.
     fn why(&self) -> NoInverse {
-        let starts = (0..=self.options.restarts.min(12))
-            .map(|number| if number == 0 { self.reference } else { self.spread(number) });
-        let found: Vec<_> = starts.map(|start| self.descend(&start, Within::Anything, 0.0)).collect();
-        let solved = found.iter().filter(|found| within(&found.motion, REACHED));
+        let found = self.anywhere(After::Pose);
+        let solved = found.iter().filter(|found| within(&found.motion, ACCEPTED));
         let beyond = solved.filter_map(|found| self.furthest_out(&self.unwound(&found.joints)));
         if let Some((joint, needed, _)) = beyond.min_by(|a, b| a.2.total_cmp(&b.2)) {
             let limit = &self.model.limits[joint];
@@ -306,6 +330,14 @@ impl Search<'_> {
             return NoInverse::BeyondLimit { joint: name, needed, lower: limit.lower, upper: limit.upper };
         }
         self.short(&found)
+    }
+
+    /// Where searches without limits end, from the reference and a dozen other postures.
+    fn anywhere(&self, after: After) -> Vec<Found> {
+        (0..=self.options.restarts.min(12))
+            .map(|number| if number == 0 { self.reference } else { self.spread(number) })
+            .map(|start| self.descend(&start, Within::Anything, after, 0.0))
+            .collect()
     }
 
     /// The joint that is furthest outside, where it is, and by how much.
@@ -318,6 +350,11 @@ impl Search<'_> {
     }
 
     fn short(&self, found: &[Found]) -> NoInverse {
+        let place = self.anywhere(After::Place);
+        let short_m = place.iter().map(|found| found.motion.norm()).fold(f64::INFINITY, f64::min);
+        if short_m > CLOSE {
+            return NoInverse::OutOfReach { short_m };
+        }
         let nearest = found.iter().min_by(|a, b| a.motion.norm().total_cmp(&b.motion.norm()));
         let (short_m, short_rad, smallest) = nearest.map_or((f64::NAN, f64::NAN, f64::NAN), |found| {
             let reach = self.model.reach(&found.joints, &self.tool);
@@ -328,7 +365,7 @@ impl Search<'_> {
         if short_m < CLOSE && short_rad < CLOSE && smallest < SINGULAR {
             return NoInverse::Singular { short_m, short_rad, smallest };
         }
-        NoInverse::OutOfReach { short_m, short_rad }
+        NoInverse::NotSoOriented { short_m, short_rad }
     }
 }
 
