@@ -8,9 +8,11 @@ probepath is used here, so agreement means that the file says what it claims to 
 
 import hashlib
 import json
+import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections import Counter
 from pathlib import Path
 
@@ -71,8 +73,11 @@ def rerun(exam):
         print("skipped: rerun (rerun-sdk is not installed beside this Python)")
         return
     recording = Path(exam).with_suffix(".rrd")
+    # A home of its own, so that its question about usage data is answered with no, and nobody's settings are touched.
+    home = dict(os.environ, HOME=tempfile.mkdtemp())
+    subprocess.run([program, "analytics", "disable"], capture_output=True, env=home, check=True)
     for arguments in (["check", exam], ["convert", exam, "-o", str(recording)]):
-        done = subprocess.run([program, "mcap", *arguments], capture_output=True, text=True)
+        done = subprocess.run([program, "mcap", *arguments], capture_output=True, text=True, env=home)
         if done.returncode:
             sys.exit(f"rerun mcap {arguments[0]}: {done.stdout}{done.stderr}")
         print(f"rerun mcap {arguments[0]}: {(done.stdout + done.stderr).strip()}")

@@ -101,14 +101,35 @@ fn main() -> Result<(), Box<dyn Error>> {
     for with_bscans in [false, true] {
         measure(&path, with_bscans)?;
     }
+    cost_of_offering()?;
     if given.is_none() {
         std::fs::remove_file(&path)?;
     }
     Ok(())
 }
 
-fn measure(path: &std::path::Path, with_bscans: bool) -> Result<(), Box<dyn Error>> {
-    let header = ExamHeader {
+/// What the control loop pays for a tick when the queue has room: bursts that fit into it.
+fn cost_of_offering() -> Result<(), Box<dyn Error>> {
+    let mut costs = Vec::new();
+    for _ in 0..20 {
+        let writer = ExamWriter::new(std::io::sink(), &header(), Pace::RealTime)?;
+        let mut noise = Noise(1);
+        let ticks: Vec<TickRecord> = (0..2000).map(|n| tick(n, &mut noise)).collect::<Result<_, _>>()?;
+        for tick in ticks {
+            let begun = Instant::now();
+            writer.tick(tick);
+            costs.push(begun.elapsed().as_secs_f64() * 1e6);
+        }
+        writer.finish()?;
+    }
+    costs.sort_by(f64::total_cmp);
+    let at = |part: f64| costs[(part * (costs.len() - 1) as f64) as usize];
+    println!("offering one tick: median {:.2} us, p99 {:.2} us, most {:.2} us", at(0.5), at(0.99), at(1.0));
+    Ok(())
+}
+
+fn header() -> ExamHeader {
+    ExamHeader {
         software: "probepath".into(),
         study_code: "SIZE".into(),
         protocol: "none".into(),
@@ -117,14 +138,17 @@ fn measure(path: &std::path::Path, with_bscans: bool) -> Result<(), Box<dyn Erro
         seed: Some(1),
         joint_names: (1..=6).map(|joint| format!("joint_{joint}")).collect(),
         period: Span::from_milliseconds(2),
-    };
+    }
+}
+
+fn measure(path: &std::path::Path, with_bscans: bool) -> Result<(), Box<dyn Error>> {
     let mut noise = Noise(1);
     let scans = if with_bscans { TICKS / TICKS_PER_BSCAN } else { 0 };
     let images: Vec<PlacedBScan> =
         (0..40.min(scans)).map(|n| bscan(n, &mut noise)).collect::<Result<_, _>>()?;
     let ticks: Vec<TickRecord> = (0..TICKS).map(|n| tick(n, &mut noise)).collect::<Result<_, _>>()?;
     let begun = Instant::now();
-    let writer = ExamWriter::create(path, &header, Pace::Simulated)?;
+    let writer = ExamWriter::create(path, &header(), Pace::Simulated)?;
     for tick in ticks {
         if with_bscans && tick.tick % TICKS_PER_BSCAN == 0 {
             let n = tick.tick / TICKS_PER_BSCAN;

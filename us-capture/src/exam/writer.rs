@@ -1,7 +1,7 @@
 //! [`ExamWriter`]: an [`ExamFile`] on a thread of its own, behind a bounded queue.
 
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
@@ -43,7 +43,8 @@ pub struct Lost {
 /// arm must not end between two ticks for a full disk. Stop the arm on a fault.
 pub struct ExamWriter {
     queue: SyncSender<Entry>,
-    thread: JoinHandle<Result<Written, ExamError>>,
+    /// `None` only while the writer is being dropped.
+    thread: Option<JoinHandle<Result<Written, ExamError>>>,
     pace: Pace,
     shared: Arc<Shared>,
 }
@@ -74,7 +75,7 @@ impl ExamWriter {
     pub fn create(path: &Path, header: &ExamHeader, pace: Pace) -> Result<Self, ExamError> {
         let open = |source| ExamError::Open { name: path.display().to_string(), source: Arc::new(source) };
         let file = File::create(path).map_err(open)?;
-        Self::new(BufWriter::new(file), header, pace)
+        Self::new(Disk { file: BufWriter::new(file), synced: pace == Pace::RealTime }, header, pace)
     }
 
     /// Begins an exam in anything that takes bytes.
@@ -103,7 +104,7 @@ impl ExamWriter {
             .name("exam".into())
             .spawn(move || Drain { file, shared: theirs, told: Lost::default() }.run(&entries))
             .map_err(|source| ExamError::Write { ticks: 0, bscans: 0, source: Arc::new(source) })?;
-        Ok(Self { queue, thread, pace, shared })
+        Ok(Self { queue, thread: Some(thread), pace, shared })
     }
 
     /// Records one tick.
@@ -141,9 +142,15 @@ impl ExamWriter {
     ///
     /// # Errors
     /// The first that writing met.
-    pub fn finish(self) -> Result<Written, ExamError> {
+    pub fn finish(mut self) -> Result<Written, ExamError> {
+        self.end().unwrap_or(Err(ExamError::WriterGone))
+    }
+
+    fn end(&mut self) -> Option<Result<Written, ExamError>> {
+        let thread = self.thread.take()?;
+        // A thread that is gone says why by what it returns.
         let _ = self.queue.send(Entry::End);
-        self.thread.join().unwrap_or(Err(ExamError::WriterGone))
+        thread.join().ok()
     }
 
     fn offer(&self, entry: Entry, lost: &AtomicU64) {
@@ -157,6 +164,30 @@ impl ExamWriter {
         if !taken {
             lost.fetch_add(1, Ordering::Relaxed);
         }
+    }
+}
+
+/// An exam that is left by an error is still ended: its index is written and nothing waits in the queue.
+impl Drop for ExamWriter {
+    fn drop(&mut self) {
+        let _ = self.end();
+    }
+}
+
+/// A file whose chunks reach the disk itself, not only the system, when time is real: a power cut costs a second.
+struct Disk {
+    file: BufWriter<File>,
+    synced: bool,
+}
+
+impl Write for Disk {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()?;
+        if self.synced { self.file.get_ref().sync_data() } else { Ok(()) }
     }
 }
 

@@ -128,3 +128,22 @@ fn in_real_time_what_finds_no_room_is_lost_counted_and_said_in_the_file() {
     let said = format!("{} ticks, {} B-scans and 0 events were not recorded", lost.ticks, lost.bscans);
     assert!(exam.events.iter().any(|event| event.text.contains(&said)), "{:?}", exam.events);
 }
+
+#[test]
+fn a_writer_left_by_an_error_ends_its_file() {
+    let disk = Shared::default();
+    let writer = ExamWriter::new(disk.clone(), &header(), Pace::Simulated).unwrap();
+    let mut noise = Noise(1);
+    (0..700).for_each(|n| writer.tick(tick(n, &mut noise)));
+    drop(writer);
+    let (back, ending) = read(&disk.bytes()).unwrap();
+    assert_eq!((back.len(), ending), (700, Ending::Complete));
+}
+
+#[test]
+fn a_folder_that_is_not_there_is_named() {
+    let path = std::path::Path::new("no/such/folder/exam.mcap");
+    let error = ExamWriter::create(path, &header(), Pace::Simulated).err().unwrap().to_string();
+    assert!(error.contains("no/such/folder/exam.mcap"), "{error}");
+    assert!(ExamReader::open(path).err().unwrap().to_string().contains("no/such/folder"));
+}
