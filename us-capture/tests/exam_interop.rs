@@ -1,4 +1,5 @@
 //! An exam file as strangers read it: PyPI's `mcap` with `mcap-protobuf-support`, and Rerun.
+#![expect(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

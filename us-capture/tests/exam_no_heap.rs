@@ -1,4 +1,5 @@
 //! Recording a tick touches no heap on the caller's thread.
+#![expect(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use probepath_frames::nalgebra::{Isometry3, Vector3};
