@@ -2,15 +2,26 @@
 //!
 //! It never hears of robots.
 
+mod centreline;
 mod error;
 pub mod fast_marching;
 mod lumen;
 mod patch;
+mod reconstruct;
+mod section;
 mod settings;
+mod spline;
+mod stenosis;
+mod surface;
 
 #[cfg(test)]
 mod phantom_images;
 
+pub use centreline::{Centreline, CentrelinePoint};
 pub use error::ReconError;
 pub use lumen::{Contour, ImageLumen, NoLumen, segment};
+pub use reconstruct::{ImageCounts, LumenReconstruction, ReconWarning, reconstruct_lumen};
+pub use section::{Section, SectionMeasure};
 pub use settings::{LumenSettings, PointSpread, SeedPoint};
+pub use stenosis::{Reference, ReferenceSide, Stenosis};
+pub use surface::LumenSurface;

@@ -63,3 +63,20 @@ pub enum NoLumen {
     #[error("the fit of the wall did not settle")]
     Unsettled,
 }
+
+impl NoLumen {
+    /// The reason without its numbers, for counting.
+    pub const fn kind(&self) -> &'static str {
+        match self {
+            Self::Dark { .. } => "no contact",
+            Self::NothingRound { .. } => "nothing round",
+            Self::OutsidePicture { .. } => "outside the picture",
+            Self::NoContrast { .. } => "no contrast",
+            Self::NoBorder { .. } => "no border",
+            Self::NoWall { .. } => "no wall",
+            Self::Radius { .. } => "radius out of range",
+            Self::Jump { .. } => "away from its neighbours",
+            Self::Unsettled => "fit did not settle",
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! The whole road: from B-scans that know where they were to the lumen and its stenoses.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+use probepath_us_capture::PlacedBScan;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::centreline::Centreline;
+use crate::surface::{self, LumenSurface, Tube};
+use crate::{
+    Contour, ImageLumen, LumenSettings, NoLumen, ReconError, Section, Stenosis, section, segment, stenosis,
+};
+
+/// Sections are this far apart (m).
+const SECTION_STEP_M: f64 = 0.5e-3;
+/// A contour whose centre is farther than this from the smooth centreline is of something else (m).
+const FAR_M: f64 = 3e-3;
+/// The least number of contours that make a surface.
+const LEAST_CONTOURS: usize = 4;
+
+/// The lumen in 3D, with everything measured on it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LumenReconstruction {
+    /// What each image gave, in their order.
+    pub images: Vec<ImageLumen>,
+    /// The surface's grid.
+    pub surface: LumenSurface,
+    /// The curve along its middle.
+    pub centreline: Centreline,
+    /// Sections normal to it, every half millimetre.
+    pub sections: Vec<Section>,
+    /// The narrowings found, along the vessel.
+    pub stenoses: Vec<Stenosis>,
+    /// How many images there were, and how many showed a lumen.
+    pub counts: ImageCounts,
+    /// What the reader should know.
+    pub warnings: Vec<ReconWarning>,
+}
+
+/// How many images showed a lumen.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ImageCounts {
+    /// Images in all.
+    pub images: usize,
+    /// Those in which no lumen was seen.
+    pub without_lumen: usize,
+    /// Why, and how often.
+    pub reasons: BTreeMap<String, usize>,
+}
+
+/// What does not spoil a reconstruction, but has to be said with it.
+#[derive(Clone, Debug, Error, PartialEq, Serialize)]
+#[non_exhaustive]
+pub enum ReconWarning {
+    /// No image shows the lumen along a stretch.
+    #[error("no lumen was seen from {from_mm:.1} to {to_mm:.1} mm: nothing is measured there")]
+    Gap {
+        /// Where it begins (mm).
+        from_mm: f64,
+        /// Where it ends (mm).
+        to_mm: f64,
+    },
+    /// The dark region runs on into another vessel.
+    #[error(
+        "near {from_mm:.1} to {to_mm:.1} mm the lumen runs on into a branch or a vein: areas there are less sure"
+    )]
+    Branch {
+        /// Where it begins (mm).
+        from_mm: f64,
+        /// Where it ends (mm).
+        to_mm: f64,
+    },
+    /// Many images without a lumen.
+    #[error("no lumen was seen in {percent:.0} % of the images")]
+    ManyWithout {
+        /// Their part (%).
+        percent: f64,
+    },
+}
+
+/// Reconstructs the lumen from images along a sweep, each roughly normal to the vessel.
+///
+/// # Errors
+/// When the settings make no sense, an image has no size or place, or too few images show a lumen.
+pub fn reconstruct_lumen(
+    images: &[PlacedBScan],
+    settings: &LumenSettings,
+) -> Result<LumenReconstruction, ReconError> {
+    settings.check()?;
+    images.iter().try_for_each(check)?;
+    if images.is_empty() {
+        return Err(ReconError::NoImages);
+    }
+    let mut lumens = segment(images, settings);
+    let centreline = centreline(&mut lumens)?;
+    let contours: Vec<&Contour> = lumens.iter().filter_map(|image| image.lumen.as_ref().ok()).collect();
+    let spacing = centreline.length_m() / contours.len() as f64;
+    let tube = Tube::fit(&centreline, &contours, spacing)?;
+    let seen = places(&centreline, &contours);
+    let measured = |at: f64| is_measured(&seen, at, settings.longest_gap_m);
+    let surface = surface::grid(&centreline, &tube, settings.grid, measured);
+    let sections = section::sections(&centreline, &tube, SECTION_STEP_M, measured);
+    let stenoses = stenosis::find(&sections, settings.least_percent_area);
+    let counts = counts(&lumens);
+    let warnings = warnings(&seen, &counts, settings);
+    Ok(LumenReconstruction { surface, sections, stenoses, counts, warnings, centreline, images: lumens })
+}
+
+fn check(image: &PlacedBScan) -> Result<(), ReconError> {
+    let number = image.bscan.number;
+    let setting = &image.bscan.setting;
+    let bad = |what| Err(ReconError::Image { number, what });
+    let positive = |x: f64| x.is_finite() && x > 0.0;
+    if !positive(setting.spacing.x_m) || !positive(setting.spacing.y_m) {
+        return bad("its pixel spacing");
+    }
+    if !positive(setting.depth_m) || !setting.focus_m.is_finite() || !setting.window_top_m.is_finite() {
+        return bad("its depth, focus or window");
+    }
+    if !positive(setting.window_width_m) {
+        return bad("the width of its window");
+    }
+    if image.world_from_image.is_finite() { Ok(()) } else { bad("its pose") }
+}
+
+/// The centreline; contours far from it lose their place.
+fn centreline(lumens: &mut [ImageLumen]) -> Result<Centreline, ReconError> {
+    loop {
+        let centres: Vec<Vector3<f64>> =
+            lumens.iter().filter_map(|image| Some(image.lumen.as_ref().ok()?.centre.vector())).collect();
+        if centres.len() < LEAST_CONTOURS {
+            return Err(too_few(lumens, centres.len()));
+        }
+        let line = Centreline::through(&centres)?;
+        let mut refused = false;
+        for image in lumens.iter_mut() {
+            let Ok(contour) = &image.lumen else { continue };
+            let place = contour.centre.vector();
+            let by = line.nearest(&place).map_or(0.0, |near| (near.point.vector() - place).norm());
+            if by > FAR_M {
+                image.lumen = Err(NoLumen::Jump { by_mm: by * 1e3 });
+                refused = true;
+            }
+        }
+        if !refused {
+            return Ok(line);
+        }
+    }
+}
+
+fn too_few(lumens: &[ImageLumen], seen: usize) -> ReconError {
+    let counts = counts(lumens);
+    let most = counts.reasons.iter().max_by_key(|(_, count)| **count);
+    let reason = most.map_or_else(|| "none".into(), |(reason, _)| reason.clone());
+    ReconError::TooFew { seen, images: lumens.len(), needed: LEAST_CONTOURS, reason }
+}
+
+fn counts(lumens: &[ImageLumen]) -> ImageCounts {
+    let mut counts = ImageCounts { images: lumens.len(), ..ImageCounts::default() };
+    for why in lumens.iter().filter_map(|image| image.lumen.as_ref().err()) {
+        counts.without_lumen += 1;
+        *counts.reasons.entry(why.kind().into()).or_default() += 1;
+    }
+    counts
+}
+
+/// Where along the centreline contours lie, in order, and whether they branch.
+fn places(line: &Centreline, contours: &[&Contour]) -> Vec<(f64, bool)> {
+    let place = |contour: &&Contour| Some((line.nearest(&contour.centre.vector())?.at_m, contour.branches));
+    let mut places: Vec<(f64, bool)> = contours.iter().filter_map(place).collect();
+    places.sort_by(|a, b| a.0.total_cmp(&b.0));
+    places
+}
+
+/// Whether contours lie on both sides of a place, no farther apart than the longest gap.
+fn is_measured(seen: &[(f64, bool)], at: f64, longest_gap: f64) -> bool {
+    let after = seen.partition_point(|place| place.0 < at);
+    let next = seen.get(after).map_or(f64::INFINITY, |place| place.0 - at);
+    let last = after.checked_sub(1).and_then(|i| seen.get(i)).map_or(f64::INFINITY, |place| at - place.0);
+    // At the ends a contour within half a gap will do.
+    next + last <= longest_gap || next.min(last) <= 0.25 * longest_gap
+}
+
+fn warnings(seen: &[(f64, bool)], counts: &ImageCounts, settings: &LumenSettings) -> Vec<ReconWarning> {
+    let mut warnings = Vec::new();
+    let percent = 100.0 * counts.without_lumen as f64 / counts.images.max(1) as f64;
+    if percent > 10.0 {
+        warnings.push(ReconWarning::ManyWithout { percent });
+    }
+    for pair in seen.windows(2).filter(|pair| pair[1].0 - pair[0].0 > settings.longest_gap_m) {
+        warnings.push(ReconWarning::Gap { from_mm: pair[0].0 * 1e3, to_mm: pair[1].0 * 1e3 });
+    }
+    // Three in a row: one alone is speckle.
+    for run in seen.chunk_by(|a, b| a.1 == b.1).filter(|run| run.len() >= 3 && run[0].1) {
+        warnings.push(ReconWarning::Branch { from_mm: run[0].0 * 1e3, to_mm: run[run.len() - 1].0 * 1e3 });
+    }
+    warnings
+}
