@@ -21,7 +21,7 @@ mod workspace;
 
 use probepath_frames::{Base, Flange, Point, Pose, Probe};
 
-use crate::{Asked, BlackBox, Joints, LimitsError, Model, MotionLimits, Operator, State, Tick};
+use crate::{Asked, BlackBox, Joints, Limited, LimitsError, Model, MotionLimits, Operator, State, Tick};
 pub use limits::GuardLimits;
 pub use trip::Trip;
 pub use workspace::{Plane, Workspace};
@@ -193,12 +193,19 @@ impl Guard {
         Ok(())
     }
 
-    /// One tick: what to make of the command (after the limits, before it is sent).
-    pub(crate) fn judge_command(&mut self, wanted: &Joints, changed: f64, joint: usize, dt: f64) -> Verdict {
+    /// One tick: what to make of a command (after the limits, before it is sent), and of where the arm would come to
+    /// rest if it braked after it.
+    pub(crate) fn judge_command(
+        &mut self,
+        limited: &Limited,
+        brakes_at: impl Fn() -> Joints,
+        dt: f64,
+    ) -> Verdict {
+        let Limited { changed, joint, position } = *limited;
         let found = if changed > self.limits.correction {
             Some(Trip::Corrected { joint, by: changed })
         } else {
-            self.judge_place(wanted, dt)
+            self.judge_place(&position, brakes_at, dt)
         };
         self.settle(found, None)
     }
@@ -260,20 +267,25 @@ impl Guard {
         }
     }
 
-    /// The commanded place of the probe: inside the workspace, no faster than allowed.
-    fn judge_place(&mut self, wanted: &Joints, dt: f64) -> Option<Trip> {
+    /// The commanded place of the probe: no faster than allowed, and from where a brake ends inside the workspace. As
+    /// the tick before passed the same question, the brake that follows a trip ends inside too. A probe found outside
+    /// may come back, but go no further out.
+    fn judge_place(&mut self, position: &Joints, brakes_at: impl Fn() -> Joints, dt: f64) -> Option<Trip> {
         let (Some(place), Phase::Running(watch)) = (&self.probe, &mut self.phase) else {
             return None;
         };
-        let probe = place(wanted);
-        let speed_m_s = watch.probe.map_or(0.0, |before| before.distance(&probe) / dt);
-        watch.probe = Some(probe);
-        let pressing = -watch.last.wrench.force.z;
-        let limit_m_s = self.limits.speed_m_s(pressing);
+        let probe = place(position);
+        let before = watch.probe.replace(probe).unwrap_or(probe);
+        let speed_m_s = before.distance(&probe) / dt;
+        let limit_m_s = self.limits.speed_m_s(-watch.last.wrench.force.z);
         if speed_m_s > limit_m_s {
             return Some(Trip::ProbeSpeed { speed_m_s, limit_m_s });
         }
-        self.workspace.crossed(&probe).map(|(plane, beyond_m)| Trip::Workspace { plane, beyond_m })
+        if self.workspace.planes().is_empty() {
+            return None;
+        }
+        let rest = place(&brakes_at());
+        self.workspace.crossed(&rest, &before).map(|(plane, beyond_m)| Trip::Workspace { plane, beyond_m })
     }
 
     fn late(&self, last: &State, state: &State, stale_ns: i64) -> Result<(), Trip> {

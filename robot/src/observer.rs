@@ -17,8 +17,16 @@ pub struct Tick {
     pub state: State,
     /// What the guard made of it.
     pub verdict: Verdict,
-    /// Whether the loop is braking, whatever the controller wants.
+    /// Whether the loop brakes or stays, whatever the controller wants.
     pub braking: bool,
+}
+
+impl Tick {
+    /// A tick on which the arm was told to stay.
+    pub(crate) const fn staying(index: u64, state: State) -> Self {
+        let (wanted, command) = (Command::Stay, Command::Stay);
+        Self { index, wanted, command, changed: 0.0, state, verdict: Verdict::Fine, braking: true }
+    }
 }
 
 /// What an observer wants.
@@ -30,7 +38,7 @@ pub enum Wish {
     Stop(String),
 }
 
-/// Sees every tick, brakes included: a recorder, a screen, a watch on the images. It must be quick and touch no heap
+/// Sees every exchange with the arm, from the first stay through the brake to the last stay: a recorder, a screen, a watch on the images. It must be quick and touch no heap
 /// on the way (bounded queues), because the arm waits for it.
 pub trait Observer {
     /// One tick.

@@ -15,7 +15,7 @@ use crate::{
 pub struct Finished {
     /// Who ended it.
     pub ending: Ending,
-    /// How many ticks it took, the brake included.
+    /// How many ticks it took, from the first exchange to the last.
     pub ticks: u64,
     /// The last state, at rest.
     pub last: State,
@@ -81,7 +81,7 @@ impl StopReason {
 }
 
 /// How many ticks an arm gets to come to rest before a motion begins.
-const TICKS_TO_REST: usize = 5000;
+const TICKS_TO_REST: u64 = 5000;
 
 /// Runs a controller on an arm until the controller ends, the operator or the observer asks to stop, or a fault.
 /// Whatever door the loop is left by, the arm is braked to rest within its limits through the same exchange, and
@@ -113,6 +113,8 @@ struct Motion<'a> {
     observer: &'a mut dyn Observer,
     limiter: Limiter,
     state: State,
+    /// What the observer asked for last.
+    wish: Wish,
     dt: f64,
     ticks: u64,
     /// Whether the observer may still be asked: after a panic it is left alone.
@@ -126,19 +128,24 @@ impl<'a> Motion<'a> {
         observer: &'a mut dyn Observer,
     ) -> Result<Self, Box<RunError>> {
         let refused = |reason, last| RunError { reason, last, at_rest: true, black_box: BlackBox::new(1) };
-        let state = rest(arm).map_err(|reason| Box::new(refused(reason, None)))?;
+        let rested = rest(arm, observer).map_err(|reason| Box::new(refused(reason, None)))?;
+        let state = rested.state;
         guard.begin(&state).map_err(|trip| Box::new(refused(StopReason::Guard(trip), Some(state))))?;
         let (dt, limits) = (arm.period().seconds(), *guard.motion_limits());
         let limiter = Limiter::at_rest(limits, arm.period(), state.commanded).map_err(|error| {
             guard.end();
             Box::new(refused(StopReason::Limits(error), Some(state)))
         })?;
-        Ok(Self { arm, guard, observer, limiter, state, dt, ticks: 0, observer_well: true })
+        let Rested { wish, ticks, .. } = rested;
+        Ok(Self { arm, guard, observer, limiter, state, wish, dt, ticks, observer_well: true })
     }
 
     /// The loop.
     fn go_on(&mut self, controller: &mut dyn Controller) -> Left {
         loop {
+            if let Wish::Stop(why) = std::mem::replace(&mut self.wish, Wish::GoOn) {
+                return Ok(Ending::Observer(why));
+            }
             if self.guard.is_stop_asked() {
                 return Ok(Ending::Operator);
             }
@@ -146,9 +153,7 @@ impl<'a> Motion<'a> {
                 return Ok(Ending::Done);
             };
             let (command, changed) = self.limited(&wanted)?;
-            if let Wish::Stop(why) = self.exchange(wanted, command, changed, false)? {
-                return Ok(Ending::Observer(why));
-            }
+            self.wish = self.exchange(wanted, command, changed, false)?;
         }
     }
 
@@ -159,7 +164,8 @@ impl<'a> Motion<'a> {
         };
         let before = self.limiter;
         let limited = self.limiter.limit(position).map_err(StopReason::Limits)?;
-        match self.guard.judge_command(&limited.position, limited.changed, limited.joint, self.dt) {
+        let limiter = &self.limiter;
+        match self.guard.judge_command(&limited, || limiter.brakes_at(), self.dt) {
             Verdict::Stop(trip) => {
                 // It is not sent, so the brake starts from what was sent last.
                 self.limiter = before;
@@ -206,14 +212,14 @@ impl<'a> Motion<'a> {
         };
         let at_rest = braked.is_ok() && self.limiter.is_at_rest() && !matches!(left, Err(StopReason::Arm(_)));
         // The last word, also to an arm that did not answer: it may hear without being able to speak.
-        let stayed = self.arm.exchange(&Command::Stay);
+        let stayed = self.stay();
         let reason = match (left, braked, stayed) {
             (Err(reason), _, _) | (Ok(_), Err(reason), _) => reason,
-            (Ok(ending), Ok(()), Ok(last)) => {
+            (Ok(ending), Ok(()), Ok(())) => {
                 self.guard.end();
-                return Ok(Finished { ending, ticks: self.ticks, last });
+                return Ok(Finished { ending, ticks: self.ticks, last: self.state });
             }
-            (Ok(_), Ok(()), Err(fault)) => StopReason::Arm(fault),
+            (Ok(_), Ok(()), Err(reason)) => reason,
         };
         self.guard.stop(if let StopReason::Guard(trip) = reason { trip } else { Trip::Fault });
         self.guard.end();
@@ -229,25 +235,46 @@ impl<'a> Motion<'a> {
     fn brake(&mut self) -> Result<(), StopReason> {
         while !self.limiter.is_at_rest() {
             let command = Command::Position(self.limiter.brake());
-            match self.exchange(command, command, 0.0, true) {
-                Ok(_) | Err(StopReason::Panicked { .. }) => {}
-                Err(reason) => return Err(reason),
-            }
+            answered(self.exchange(command, command, 0.0, true))?;
         }
         Ok(())
     }
+
+    fn stay(&mut self) -> Result<(), StopReason> {
+        answered(self.exchange(Command::Stay, Command::Stay, 0.0, true))
+    }
+}
+
+/// On the way to rest only the arm itself can stop the brake: an observer's panic has done its harm.
+fn answered(exchanged: Result<Wish, StopReason>) -> Result<(), StopReason> {
+    match exchanged {
+        Ok(_) | Err(StopReason::Panicked { .. }) => Ok(()),
+        Err(reason) => Err(reason),
+    }
+}
+
+/// An arm found at rest.
+struct Rested {
+    state: State,
+    /// What the observer asked for meanwhile.
+    wish: Wish,
+    ticks: u64,
 }
 
 /// Stays until the arm's commanded positions are the same for three ticks: from there the finite differences start.
-fn rest(arm: &mut dyn Arm) -> Result<State, StopReason> {
-    let mut state = arm.exchange(&Command::Stay).map_err(StopReason::Arm)?;
-    let mut same = 0;
-    for _ in 0..TICKS_TO_REST {
-        let next = arm.exchange(&Command::Stay).map_err(StopReason::Arm)?;
-        same = if next.commanded == state.commanded { same + 1 } else { 0 };
-        state = next;
+/// The observer is told of these ticks too, so that a recording has every exchange.
+fn rest(arm: &mut dyn Arm, observer: &mut dyn Observer) -> Result<Rested, StopReason> {
+    let (mut before, mut same, mut asked) = (None, 0, Wish::GoOn);
+    for index in 0..TICKS_TO_REST {
+        let state = arm.exchange(&Command::Stay).map_err(StopReason::Arm)?;
+        let tick = Tick::staying(index, state);
+        if let stop @ Wish::Stop(_) = caught("observer", || observer.tick(&tick))? {
+            asked = stop;
+        }
+        same = if before == Some(state.commanded) { same + 1 } else { 0 };
+        before = Some(state.commanded);
         if same == 2 {
-            return Ok(state);
+            return Ok(Rested { state, wish: asked, ticks: index + 1 });
         }
     }
     Err(StopReason::Restless)

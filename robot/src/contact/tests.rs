@@ -85,11 +85,14 @@ struct Held {
     largest_jerk: f64,
 }
 
-/// Touches down, then follows 150 mm of skin.
+/// Touches down, then follows 150 mm of a random skin.
 fn scan(seed: u64) -> Held {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let skin = Skin::new(&mut rng);
-    let mut plant = Plant::new(rng);
+    hold(&skin, Plant::new(rng))
+}
+
+fn hold(skin: &Skin, mut plant: Plant) -> Held {
     let law = ContactLaw::new(ContactSettings::default(), PERIOD).unwrap();
     let mut down = TouchDown::new(law, TouchDownSettings::default(), WANTED, PERIOD).unwrap();
     let gap = 0.005;
@@ -115,7 +118,7 @@ fn scan(seed: u64) -> Held {
         if x > 0.15 {
             break;
         }
-        assert!(tick < 9_999 || x > 0.05, "skin {seed}: only {x} m");
+        assert!(tick < 9_999 || x > 0.05, "only {x} m");
     }
     held.rms = (squares / f64::max(count, 1.0)).sqrt();
     held
@@ -132,6 +135,23 @@ fn a_thousand_skins_are_held_within_three_tenths_of_a_newton_and_touched_within_
     assert!(worst <= 0.3, "{worst} N RMS");
     assert!(overshoot <= 1.0, "{overshoot} N over");
     assert!(jerk <= ContactSettings::default().jerk_m_s3 * (1.0 + 1e-6), "{jerk} m/s³");
+}
+
+#[test]
+fn a_third_stiffer_or_a_servo_half_as_slow_again_is_still_held() {
+    for seed in 0..50 {
+        for (stiffness, lag) in [(4000.0, 0.016), (3000.0, 0.024)] {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let skin = Skin { stiffness: vec![stiffness; 20], ..Skin::new(&mut rng) };
+            let held = hold(&skin, Plant { lag, ..Plant::new(rng) });
+            assert!(
+                held.rms <= 0.3 && held.overshoot <= 1.0,
+                "{} N RMS, {} N over",
+                held.rms,
+                held.overshoot
+            );
+        }
+    }
 }
 
 #[test]

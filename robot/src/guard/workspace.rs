@@ -9,8 +9,8 @@ pub struct Plane {
     pub inward: Direction<Base>,
 }
 
-/// Where the probe's origin may be: on the inner side of every plane. No plane, no bound. An arm at speed needs room
-/// to brake, so a plane stands off what it protects.
+/// Where the probe's origin may be: on the inner side of every plane. No plane, no bound. The
+/// guard stops the arm while the brake still ends inside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Workspace {
     planes: Vec<Plane>,
@@ -43,9 +43,13 @@ impl Workspace {
         &self.planes
     }
 
-    /// The first plane that a point lies beyond, and by how much (m).
-    pub fn crossed(&self, point: &Point<Base>) -> Option<(usize, f64)> {
-        let beyond = |plane: &Plane| (plane.through.vector() - point.vector()).dot(&plane.inward.vector());
-        self.planes.iter().map(beyond).enumerate().find(|(_, beyond)| *beyond > 0.0)
+    /// The first plane that `next` lies beyond, and further beyond than `now` does; and by how much (m).
+    pub fn crossed(&self, next: &Point<Base>, now: &Point<Base>) -> Option<(usize, f64)> {
+        let beyond = |plane: &Plane, point: &Point<Base>| {
+            (plane.through.vector() - point.vector()).dot(&plane.inward.vector())
+        };
+        let further = |plane: &Plane| beyond(plane, next) > beyond(plane, now).max(0.0);
+        let (number, plane) = self.planes.iter().enumerate().find(|(_, plane)| further(plane))?;
+        Some((number, beyond(plane, next)))
     }
 }

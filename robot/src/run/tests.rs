@@ -303,11 +303,26 @@ fn the_workspace_and_the_probes_speed_are_kept_before_a_command_is_sent() {
     let error = run(&mut arm, &mut there(), &mut guard, &mut ()).unwrap_err();
     assert!(matches!(error.reason, StopReason::Guard(Trip::Workspace { plane: 0, .. })), "{error}");
     check(&arm);
+    let furthest = arm.rows.iter().map(|(_, state)| state.commanded[0].sin()).fold(f64::MIN, f64::max);
+    assert!(furthest <= 0.01 && furthest > 0.009, "the brake ended at {furthest}");
     let mut arm = TestArm::new(Fails::default());
     let mut guard = Guard::new(GuardLimits::default(), limits()).unwrap().within(Workspace::new(), place());
     let error = run(&mut arm, &mut there(), &mut guard, &mut ()).unwrap_err();
     assert!(matches!(error.reason, StopReason::Guard(Trip::ProbeSpeed { .. })), "{error}");
     check(&arm);
+}
+
+#[test]
+fn the_observer_sees_every_exchange() {
+    let (mut arm, mut guard) = (TestArm::new(Fails::default()), guard());
+    let mut seen = Vec::new();
+    let mut watch = |tick: &Tick| {
+        seen.push((tick.command, tick.state));
+        Wish::GoOn
+    };
+    let finished = run(&mut arm, &mut there(), &mut guard, &mut watch).unwrap();
+    assert_eq!(finished.ticks, seen.len() as u64);
+    assert!(seen == arm.rows);
 }
 
 #[test]
@@ -329,7 +344,7 @@ fn the_black_box_keeps_the_last_ticks_in_order() {
     let (_, _, error) = stopped(Fails { force: Some((500, 16.0)), ..Fails::default() });
     let indices: Vec<u64> = error.black_box.ticks().map(|tick| tick.index).collect();
     assert!(indices.windows(2).all(|pair| pair[1] == pair[0] + 1));
-    assert_eq!(error.black_box.last().map(|tick| tick.index), Some(error.black_box.seen() - 1));
+    assert_eq!(error.black_box.last().map(|tick| tick.command), Some(Command::Stay));
     let mut small = BlackBox::new(7);
     error.black_box.ticks().for_each(|tick| small.push(tick));
     let kept: Vec<u64> = small.ticks().map(|tick| tick.index).collect();
