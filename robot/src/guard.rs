@@ -129,8 +129,13 @@ impl Guard {
         &self.limits
     }
 
-    /// Other limits from the next tick on: hand guiding and scanning differ.
-    pub const fn set_limits(&mut self, limits: GuardLimits) {
+    /// Other limits from the next motion on: hand guiding and scanning differ. A confirmation to lift stays one.
+    pub fn set_limits(&mut self, limits: GuardLimits) {
+        if let Phase::Armed(ceiling) = &mut self.phase
+            && ceiling.0 <= self.limits.force_hard_n
+        {
+            *ceiling = Ceiling(limits.force_hard_n);
+        }
         self.limits = limits;
     }
 

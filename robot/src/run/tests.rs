@@ -204,6 +204,18 @@ fn too_much_force_is_lifted_out_of_but_not_pressed_into() {
 }
 
 #[test]
+fn a_hand_may_pull_harder_than_skin_may_press_and_only_while_it_guides() {
+    let mut guard = guard();
+    let mut pulled = |limits| {
+        guard.set_limits(limits);
+        let mut arm = TestArm::new(Fails { force: Some((0, 30.0)), ..Fails::default() });
+        run(&mut arm, &mut Hold::ticks(100), &mut guard, &mut ())
+    };
+    pulled(GuardLimits::hand_guiding()).unwrap();
+    pulled(GuardLimits::default()).unwrap_err();
+}
+
+#[test]
 fn the_operator_and_the_observer_stop_in_peace_at_any_tick() {
     for at in [0, 1, 2, 50, 137, 300, 500] {
         let operator = Operator::new();
