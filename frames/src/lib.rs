@@ -29,8 +29,8 @@ mod vectors;
 mod wrench;
 
 pub use error::{FrameError, TrackError};
-pub use named::NamedPose;
 pub use nalgebra;
+pub use named::NamedPose;
 pub use pose::Pose;
 pub use stamp::{ArmClock, Clock, ExamClock, ImageClock, Span, Stamp};
 pub use systems::{Base, Flange, Frame, Image, Leg, Phantom, Probe, World};

@@ -64,6 +64,9 @@ impl NamedPose {
             UnitQuaternion::from_quaternion(quaternion)
         };
         // FRAMES: both names were just compared with those of A and B.
-        Ok(Pose::assume(Isometry3::from_parts(Translation3::from(Vector3::from(self.translation_m)), rotation)))
+        Ok(Pose::assume(Isometry3::from_parts(
+            Translation3::from(Vector3::from(self.translation_m)),
+            rotation,
+        )))
     }
 }

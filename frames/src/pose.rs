@@ -59,7 +59,8 @@ impl<A: Frame, B: Frame> Pose<A, B> {
         if off > ORTHOGONAL_WITHIN || determinant <= 0.0 {
             return Err(FrameError::NotRigid { what: pair::<A, B>(), off, determinant });
         }
-        let rotation = Rotation3::from_matrix_eps(&linear, 1e-15, 100, Rotation3::from_matrix_unchecked(linear));
+        let rotation =
+            Rotation3::from_matrix_eps(&linear, 1e-15, 100, Rotation3::from_matrix_unchecked(linear));
         let translation: Vector3<f64> = matrix.fixed_view::<3, 1>(0, 3).into_owned();
         Ok(Self::assume(Isometry3::from_parts(
             Translation3::from(translation),

@@ -7,6 +7,22 @@ use nalgebra::Vector3;
 use crate::Frame;
 
 /// A body's velocity, written in `F`'s axes at `F`'s origin.
+///
+/// ```
+/// # use probepath_frames::*;
+/// fn seen(base_from_probe: Pose<Base, Probe>, in_probe: Twist<Probe>) -> Twist<Base> {
+///     base_from_probe * in_probe
+/// }
+/// ```
+///
+/// One that is written elsewhere does not fit:
+///
+/// ```compile_fail
+/// # use probepath_frames::*;
+/// fn seen(base_from_probe: Pose<Base, Probe>, in_flange: Twist<Flange>) -> Twist<Base> {
+///     base_from_probe * in_flange
+/// }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Twist<F> {
     /// Velocity of the body's point that is at `F`'s origin (m/s).
@@ -18,6 +34,36 @@ pub struct Twist<F> {
 
 /// What the outside does to the body, written in `F`'s axes about `F`'s origin. Skin that presses on the probe is a
 /// negative force along the probe's z.
+///
+/// ```
+/// # use probepath_frames::*;
+/// fn felt(base_from_probe: Pose<Base, Probe>, in_probe: Wrench<Probe>) -> Wrench<Base> {
+///     base_from_probe * (in_probe + in_probe)
+/// }
+/// ```
+///
+/// One that is written elsewhere neither fits nor adds, and a wrench is no twist:
+///
+/// ```compile_fail
+/// # use probepath_frames::*;
+/// fn felt(base_from_probe: Pose<Base, Probe>, in_flange: Wrench<Flange>) -> Wrench<Base> {
+///     base_from_probe * in_flange
+/// }
+/// ```
+///
+/// ```compile_fail
+/// # use probepath_frames::*;
+/// fn both(in_probe: Wrench<Probe>, in_flange: Wrench<Flange>) -> Wrench<Probe> {
+///     in_probe + in_flange
+/// }
+/// ```
+///
+/// ```compile_fail
+/// # use probepath_frames::*;
+/// fn mixed(base_from_probe: Pose<Base, Probe>, in_probe: Wrench<Probe>) -> Twist<Base> {
+///     base_from_probe * in_probe
+/// }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wrench<F> {
     /// Force (N).

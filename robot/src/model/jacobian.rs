@@ -92,3 +92,6 @@ impl Jacobian {
 pub fn manipulability(jacobian: &Jacobian) -> f64 {
     jacobian.manipulability()
 }
+
+#[cfg(test)]
+mod tests;
