@@ -78,7 +78,7 @@ def rerun(exam):
     subprocess.run([program, "analytics", "disable"], capture_output=True, env=home, check=True)
     for arguments in (["check", exam], ["convert", exam, "-o", str(recording)]):
         done = subprocess.run([program, "mcap", *arguments], capture_output=True, text=True, env=home)
-        if done.returncode:
+        if done.returncode or "PROBLEM" in done.stdout + done.stderr:
             sys.exit(f"rerun mcap {arguments[0]}: {done.stdout}{done.stderr}")
         print(f"rerun mcap {arguments[0]}: {(done.stdout + done.stderr).strip()}")
 

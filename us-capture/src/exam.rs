@@ -37,10 +37,12 @@
 //! | `/tick` | `probepath.Tick` | every tick, exact to the bit: command, state, wrench, the probe's pose |
 //! | `/bscan` | `probepath.BScan` | every B-scan: stamps, setting, pixel spacing, poses, wrench |
 //! | `/bscan/image` | `foxglove.RawImage` | its pixels (mono8), just before |
-//! | `/tf` | `foxglove.FrameTransform` | World to Probe about 50 times a second, World to Image with every B-scan |
+//! | `/bscan/tf` | `foxglove.FrameTransform` | World to Image, with every B-scan |
+//! | `/tf` | `foxglove.FrameTransform` | World to Probe about 50 times a second |
 //! | `/joint_states`, `/joint_commands` | `foxglove.JointStates` | about 50 times a second, for viewers |
 //! | `/wrench` | `probepath.Wrench` | about 50 times a second, for viewers |
 //! | `/events` | `foxglove.Log` | events |
+//! | `/surface` | `foxglove.SceneUpdate` | the lumen's surface, once it is reconstructed, for viewers |
 //!
 //! Attachments: the arm's URDF, cell description, calibration, protocol, taught path, report (names in
 //! [`Attachment`]). Metadata: `probepath.exam` ([`ExamHeader`]) first, `probepath.written` ([`Written`]) last.
@@ -72,7 +74,7 @@ mod writer;
 pub use error::ExamError;
 pub use file::{ExamFile, Written};
 pub use reader::{Ending, ExamEvent, ExamReader};
-pub use record::{Attachment, Event, ExamHeader, Level, ROW_ROOM, Row, TickRecord};
+pub use record::{Attachment, Event, ExamHeader, Level, ROW_ROOM, Row, Surface, TickRecord};
 pub use whole::Exam;
 pub use writer::{ExamWriter, Lost, Pace};
 

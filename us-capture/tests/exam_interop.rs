@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use probepath_frames::nalgebra::{Isometry3, Vector3};
-use probepath_frames::{Frame, Pose, Span, Stamp, Wrench};
+use probepath_frames::{Frame, Point, Pose, Span, Stamp, Wrench};
 use probepath_us_capture::exam::{
-    Attachment, Event, ExamHeader, ExamWriter, Level, Pace, Row, TickRecord, Written,
+    Attachment, Event, ExamHeader, ExamWriter, Level, Pace, Row, Surface, TickRecord, Written,
 };
 use probepath_us_capture::{BScan, PixelSpacing, PlacedBScan, Setting};
 use serde_json::{Value, json};
@@ -97,6 +97,13 @@ fn write(path: &Path) -> Written {
             writer.bscan(bscan(n / 33));
         }
     }
+    let corners = [[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.0, 0.01, 0.0], [0.0, 0.0, 0.01]];
+    writer.surface(Surface {
+        stamp: Stamp::from_nanoseconds(2_000_000 * TICKS as i64),
+        name: "lumen".into(),
+        vertices: corners.map(|[x, y, z]| Point::new(x, y, z)).into(),
+        triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+    });
     writer.attach(report);
     writer.finish().unwrap()
 }
@@ -116,13 +123,14 @@ fn expected() -> Value {
     let (tick, scan) = (tick(0), bscan(0));
     json!({
         "counts": {
-            "/tick": TICKS, "/bscan": BSCANS, "/bscan/image": BSCANS, "/events": 1, "/tf": 200 + BSCANS,
-            "/joint_states": 200, "/joint_commands": 200, "/wrench": 200,
+            "/tick": TICKS, "/bscan": BSCANS, "/bscan/image": BSCANS, "/events": 1, "/tf": 200, "/bscan/tf": BSCANS,
+            "/joint_states": 200, "/joint_commands": 200, "/wrench": 200, "/surface": 1,
         },
         "schemas": {
             "/tick": "probepath.Tick", "/bscan": "probepath.BScan", "/bscan/image": "foxglove.RawImage",
-            "/events": "foxglove.Log", "/tf": "foxglove.FrameTransform", "/joint_states": "foxglove.JointStates",
+            "/events": "foxglove.Log", "/tf": "foxglove.FrameTransform", "/bscan/tf": "foxglove.FrameTransform", "/joint_states": "foxglove.JointStates",
             "/joint_commands": "foxglove.JointStates", "/wrench": "probepath.Wrench",
+            "/surface": "foxglove.SceneUpdate",
         },
         "attachments": hashes,
         "study_code": "INTEROP-1",

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 
 use foxglove::Encode;
-use foxglove::messages::{FrameTransform, JointStates, Log, RawImage};
+use foxglove::messages::{FrameTransform, JointStates, Log, RawImage, SceneUpdate};
 use mcap::McapResult;
 
 use super::schema;
@@ -20,9 +20,11 @@ pub(crate) enum Topic {
     JointCommands,
     Wrench,
     Events,
+    Surface,
+    ImageTransform,
 }
 
-const TOPICS: [Topic; 8] = [
+const TOPICS: [Topic; 10] = [
     Topic::Tick,
     Topic::BScan,
     Topic::Image,
@@ -31,6 +33,8 @@ const TOPICS: [Topic; 8] = [
     Topic::JointCommands,
     Topic::Wrench,
     Topic::Events,
+    Topic::Surface,
+    Topic::ImageTransform,
 ];
 
 impl Topic {
@@ -44,7 +48,19 @@ impl Topic {
             Self::JointCommands => "/joint_commands",
             Self::Wrench => "/wrench",
             Self::Events => "/events",
+            Self::Surface => "/surface",
+            Self::ImageTransform => "/bscan/tf",
         }
+    }
+
+    /// Its channel's and schema's id in every file of format 1: a reader knows the topic even where the chunk that
+    /// declares it is damaged.
+    pub(crate) const fn id(self) -> u16 {
+        self as u16 + 1
+    }
+
+    pub(crate) fn by_id(id: u16) -> Option<Self> {
+        TOPICS.into_iter().find(|topic| topic.id() == id)
     }
 
     pub(crate) fn of(name: &str) -> Option<Self> {
@@ -59,9 +75,10 @@ impl Topic {
             Self::BScan => own("BScan"),
             Self::Wrench => own("Wrench"),
             Self::Image => foxglove_schema::<RawImage>(),
-            Self::Transform => foxglove_schema::<FrameTransform>(),
+            Self::Transform | Self::ImageTransform => foxglove_schema::<FrameTransform>(),
             Self::JointStates | Self::JointCommands => foxglove_schema::<JointStates>(),
             Self::Events => foxglove_schema::<Log>(),
+            Self::Surface => foxglove_schema::<SceneUpdate>(),
         }
     }
 }
@@ -70,31 +87,31 @@ fn foxglove_schema<M: Encode>() -> (String, Vec<u8>) {
     M::get_schema().map(|schema| (schema.name, schema.data.into_owned())).unwrap_or_default()
 }
 
-/// Which topics a file has declared, and how many messages each has.
+/// How many messages each topic has; none before it is declared.
 #[derive(Debug, Default)]
 pub(crate) struct Channels {
-    known: [Option<(u16, u32)>; TOPICS.len()],
+    messages: BTreeMap<u16, u32>,
 }
 
 impl Channels {
-    /// The channel of a topic and the next sequence number in it, declaring it first when it is new.
+    /// The next sequence number of a topic, declaring it first when it is new.
     pub(crate) fn next<W: Write + Seek>(
         &mut self,
         topic: Topic,
         mcap: &mut mcap::Writer<W>,
-    ) -> McapResult<(u16, u32)> {
-        let Some(slot) = self.known.get_mut(topic as usize) else { return Ok((0, 0)) };
-        let (id, sequence) = match *slot {
-            Some(known) => known,
-            None => (declare(topic, mcap)?, 0),
-        };
-        *slot = Some((id, sequence.wrapping_add(1)));
-        Ok((id, sequence))
+    ) -> McapResult<u32> {
+        if let Some(count) = self.messages.get_mut(&topic.id()) {
+            *count = count.wrapping_add(1);
+            return Ok(*count);
+        }
+        declare(topic, mcap)?;
+        self.messages.insert(topic.id(), 0);
+        Ok(0)
     }
 }
 
 fn declare<W: Write + Seek>(topic: Topic, mcap: &mut mcap::Writer<W>) -> McapResult<u16> {
     let (name, descriptors) = topic.schema();
-    let schema = mcap.add_schema(&name, "protobuf", &descriptors)?;
-    mcap.add_channel(schema, topic.name(), "protobuf", &BTreeMap::new())
+    let schema = mcap.add_schema_with_id(topic.id(), &name, "protobuf", &descriptors)?;
+    mcap.add_channel_with_id(topic.id(), schema, topic.name(), "protobuf", &BTreeMap::new())
 }

@@ -31,7 +31,7 @@ impl Content {
             },
             op::METADATA => match parse::metadata(body) {
                 Some((name, values)) => push(events, ExamEvent::Metadata { name, values }),
-                None => Err("a metadata record whose lengths are wrong".into()),
+                None => Err("a metadata record whose checksum is wrong or missing".into()),
             },
             _ => Ok(()),
         };
@@ -83,7 +83,10 @@ impl Content {
     }
 
     fn message(&mut self, message: &parse::Message<'_>, events: &mut Events) -> Result<(), ExamError> {
-        match self.topics.get(&message.channel).copied().flatten() {
+        // Undeclared: the chunk that declares it was damaged.
+        let topic =
+            self.topics.get(&message.channel).copied().unwrap_or_else(|| Topic::by_id(message.channel));
+        match topic {
             Some(Topic::Tick) => events.push_back(ExamEvent::Tick(decode::tick(message.data)?)),
             Some(Topic::Image) => self.picture = Some(decode::raw_image(message.data)?),
             Some(Topic::BScan) => {
@@ -93,8 +96,16 @@ impl Content {
             Some(Topic::Events) => {
                 events.push_back(ExamEvent::Event(decode::event(message.data, message.log_time)?));
             }
-            // What viewers show is a copy of what the ticks hold exactly.
-            Some(Topic::Transform | Topic::JointStates | Topic::JointCommands | Topic::Wrench) | None => {}
+            // What viewers show is a copy of what the ticks hold exactly, and of what can be made again.
+            Some(
+                Topic::Transform
+                | Topic::ImageTransform
+                | Topic::JointStates
+                | Topic::JointCommands
+                | Topic::Wrench
+                | Topic::Surface,
+            )
+            | None => {}
         }
         Ok(())
     }

@@ -1,13 +1,14 @@
 //! From plain values to the messages of the file.
 
 use foxglove::messages::{
-    FrameTransform, JointState, JointStates, Log, Quaternion, RawImage, Timestamp, Vector3, log,
+    Color, FrameTransform, JointState, JointStates, Log, Point3, Quaternion, RawImage, SceneEntity,
+    SceneUpdate, Timestamp, TriangleListPrimitive, Vector3, log,
 };
 use probepath_frames::nalgebra::Isometry3;
-use probepath_frames::{Frame, Pose, Probe, Stamp, Wrench};
+use probepath_frames::{Frame, Point, Pose, Probe, Stamp, World, Wrench};
 
 use super::proto;
-use crate::exam::{Event, Level, Row, TickRecord};
+use crate::exam::{Event, Level, Row, Surface, TickRecord};
 use crate::{BScan, PlacedBScan};
 
 /// A stamp as Foxglove has it; what lies before the exam's zero becomes zero (our own messages keep it).
@@ -59,6 +60,30 @@ pub(crate) fn log(event: &Event) -> Log {
         file: String::new(),
         line: 0,
     }
+}
+
+/// A red, slightly transparent entity of triangles in the World.
+pub(crate) fn scene(surface: &Surface) -> SceneUpdate {
+    let point = |p: &Point<World>| Point3 { x: p.vector().x, y: p.vector().y, z: p.vector().z };
+    let triangles = TriangleListPrimitive {
+        pose: Some(foxglove::messages::Pose {
+            position: Some(Vector3::default()),
+            orientation: Some(Quaternion { w: 1.0, ..Quaternion::default() }),
+        }),
+        points: surface.vertices.iter().map(point).collect(),
+        color: Some(Color { r: 0.8, g: 0.15, b: 0.1, a: 0.8 }),
+        colors: Vec::new(),
+        indices: surface.triangles.iter().flatten().copied().collect(),
+    };
+    let entity = SceneEntity {
+        timestamp: Some(timestamp(surface.stamp)),
+        frame_id: World::NAME.into(),
+        id: surface.name.clone(),
+        frame_locked: true,
+        triangles: vec![triangles],
+        ..SceneEntity::default()
+    };
+    SceneUpdate { deletions: Vec::new(), entities: vec![entity] }
 }
 
 pub(crate) fn raw_image(bscan: &BScan) -> RawImage {

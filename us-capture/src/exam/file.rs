@@ -12,9 +12,9 @@ use probepath_frames::{Span, Stamp};
 use prost::Message;
 
 use super::channels::{Channels, Topic};
-use super::encode;
+use super::{encode, parse};
 use crate::PlacedBScan;
-use crate::exam::{Attachment, Event, ExamError, ExamHeader, TickRecord};
+use crate::exam::{Attachment, Event, ExamError, ExamHeader, Surface, TickRecord};
 
 /// A chunk is closed when its messages span this much exam time (ns)...
 const CHUNK_NS: u64 = 1_000_000_000;
@@ -124,7 +124,13 @@ impl<W: Write> ExamFile<W> {
         check_size(&format!("B-scan {}", placed.bscan.number), placed.bscan.pixels().len())?;
         self.begin(arrived)?;
         self.put(Topic::Image, arrived, formed, &encode::raw_image(&placed.bscan))?;
-        self.put(Topic::Transform, arrived, formed, &encode::transform(formed, &placed.world_from_image))?;
+        // A topic of its own: viewers want each topic in order, and images come later than the ticks beside them.
+        self.put(
+            Topic::ImageTransform,
+            arrived,
+            formed,
+            &encode::transform(formed, &placed.world_from_image),
+        )?;
         self.put(Topic::BScan, arrived, formed, &encode::bscan(placed))?;
         self.written.bscans += 1;
         self.end()
@@ -138,6 +144,24 @@ impl<W: Write> ExamFile<W> {
         self.begin(event.stamp)?;
         self.put(Topic::Events, event.stamp, event.stamp, &encode::log(event))?;
         self.written.events += 1;
+        self.end()
+    }
+
+    /// Records a surface for viewers.
+    ///
+    /// # Errors
+    /// When a triangle names a corner that is not there, it is larger than a record may be, or bytes could not be
+    /// written, now or earlier.
+    pub fn surface(&mut self, surface: &Surface) -> Result<(), ExamError> {
+        let corners = surface.vertices.len();
+        if let Some(wrong) = surface.triangles.iter().flatten().find(|index| **index as usize >= corners) {
+            let why = format!("a triangle names corner {wrong} of {corners}");
+            return Err(ExamError::BadRecord { what: format!("surface {}", surface.name), why });
+        }
+        // Three doubles and their keys; three indices of four bytes.
+        check_size(&surface.name, corners * 29 + surface.triangles.len() * 12)?;
+        self.begin(surface.stamp)?;
+        self.put(Topic::Surface, surface.stamp, surface.stamp, &encode::scene(surface))?;
         self.end()
     }
 
@@ -161,12 +185,17 @@ impl<W: Write> ExamFile<W> {
         Ok(())
     }
 
-    /// Writes a metadata record: names and values of your own, in the order of the names.
+    /// Writes a metadata record: names and values of your own, in the order of the names, and a value `checksum` over
+    /// them (MCAP has none for metadata).
     ///
     /// # Errors
     /// When bytes could not be written, now or earlier.
     pub fn metadata(&mut self, name: &str, values: BTreeMap<String, String>) -> Result<(), ExamError> {
-        let record = Metadata { name: name.into(), metadata: values };
+        let mut metadata = values;
+        metadata.remove(parse::CHECKSUM);
+        let checksum = parse::metadata_checksum(name, &metadata);
+        metadata.insert(parse::CHECKSUM.into(), checksum);
+        let record = Metadata { name: name.into(), metadata };
         self.write(|mcap, _| mcap.write_metadata(&record).and_then(|()| mcap.flush()))?;
         self.chunk = Chunk::default();
         Ok(())
@@ -222,7 +251,7 @@ impl<W: Write> ExamFile<W> {
         message.encode_raw(&mut buffer);
         let (log_time, publish_time) = (log_time(logged), log_time(published));
         let done = self.write(|mcap, channels| {
-            let (channel_id, sequence) = channels.next(topic, mcap)?;
+            let (channel_id, sequence) = (topic.id(), channels.next(topic, mcap)?);
             mcap.write_to_known_channel(
                 &MessageHeader { channel_id, sequence, log_time, publish_time },
                 &buffer,

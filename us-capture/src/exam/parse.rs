@@ -74,10 +74,27 @@ pub(crate) fn message(body: &[u8]) -> Option<Message<'_>> {
     Some(Message { channel, log_time, data: bytes.0 })
 }
 
-/// A Metadata record: name and values.
+/// A Metadata record: name and values, their checksum compared and taken out.
 pub(crate) fn metadata(body: &[u8]) -> Option<(String, BTreeMap<String, String>)> {
     let mut bytes = Bytes(body);
-    Some((bytes.text()?.to_owned(), bytes.map()?))
+    let (name, mut values) = (bytes.text()?.to_owned(), bytes.map()?);
+    let saved = values.remove(CHECKSUM)?;
+    (saved == metadata_checksum(&name, &values)).then_some((name, values))
+}
+
+/// Name of the value that holds a metadata record's checksum: MCAP has one for chunks and attachments, but none for
+/// metadata, and a study code with a flipped bit is another study.
+pub(crate) const CHECKSUM: &str = "checksum";
+
+/// CRC-32 of a metadata record's name and values, each ended by a zero byte; hexadecimal.
+pub(crate) fn metadata_checksum(name: &str, values: &BTreeMap<String, String>) -> String {
+    let mut checksum = flate2::Crc::new();
+    let texts = values.iter().flat_map(|(key, value)| [key.as_str(), value.as_str()]);
+    for text in std::iter::once(name).chain(texts) {
+        checksum.update(text.as_bytes());
+        checksum.update(&[0]);
+    }
+    format!("{:08x}", checksum.sum())
 }
 
 /// An Attachment record, its checksum compared.

@@ -60,6 +60,11 @@ pub enum Ending {
         /// The file's size.
         bytes: u64,
     },
+    /// At its end, but a checksum over all of it is wrong: whatever was damaged was stepped over and named.
+    Damaged {
+        /// Which checksum.
+        why: String,
+    },
     /// So damaged that what follows cannot be told from noise.
     Lost {
         /// Everything before this byte was read.
@@ -210,6 +215,9 @@ impl<R: Read> ExamReader<R> {
             McapError::BadMagic if self.whole == 8 => {
                 let why = "it does not begin with the eight bytes of one".into();
                 return Err(ExamError::NotMcap { name: self.name.clone(), why });
+            }
+            McapError::BadDataCrc { .. } | McapError::BadSummaryCrc { .. } => {
+                Ending::Damaged { why: error.to_string() }
             }
             error => Ending::Lost { at_byte: self.whole, why: error.to_string() },
         });

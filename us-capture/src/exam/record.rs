@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use probepath_frames::{Pose, Probe, Span, Stamp, World, Wrench};
+use probepath_frames::{Point, Pose, Probe, Span, Stamp, World, Wrench};
 use sha2::{Digest, Sha256};
 
 use crate::exam::ExamError;
@@ -85,6 +85,20 @@ pub struct Event {
     pub source: String,
     /// What, in words.
     pub text: String,
+}
+
+/// A surface for viewers: the lumen, once it is reconstructed. It is a copy, in single numbers of a viewer's scene: the
+/// surface itself is made again from the B-scans.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Surface {
+    /// When it was made.
+    pub stamp: Stamp,
+    /// What it is (`lumen`, ...); a later one of the same name replaces it in the viewer.
+    pub name: String,
+    /// Its corners.
+    pub vertices: Vec<Point<World>>,
+    /// Its triangles, as indices of corners.
+    pub triangles: Vec<[u32; 3]>,
 }
 
 /// A file inside the exam file.

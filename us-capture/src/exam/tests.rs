@@ -231,6 +231,21 @@ fn a_name_is_no_study_code_and_nothing_is_written() {
 }
 
 #[test]
+fn a_surface_whose_triangles_have_no_corners_is_refused_and_a_good_one_is_written() {
+    let mut file = ExamFile::new(Vec::new(), &header()).unwrap();
+    let vertices = vec![probepath_frames::Point::new(0.0, 0.0, 0.0); 3];
+    let good = Surface { stamp: Stamp::ZERO, name: "lumen".into(), vertices, triangles: vec![[0, 1, 2]] };
+    let bad = Surface { triangles: vec![[0, 1, 3]], ..good.clone() };
+    assert!(file.surface(&bad).unwrap_err().to_string().contains("corner 3 of 3"));
+    file.surface(&good).unwrap();
+    let (bytes, _) = file.finish().unwrap();
+    let messages: Vec<_> = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap).collect();
+    assert_eq!((messages.len(), messages[0].channel.topic.as_str()), (1, "/surface"));
+    let scene: foxglove::messages::SceneUpdate = prost::Message::decode(messages[0].data.as_ref()).unwrap();
+    assert_eq!(scene.entities[0].triangles[0].indices, [0, 1, 2]);
+}
+
+#[test]
 fn a_row_of_nine_joints_is_refused() {
     assert!(matches!(Row::from_slice(&[0.0; 9]), Err(ExamError::TooManyJoints { found: 9 })));
 }

@@ -11,7 +11,7 @@ use std::thread::JoinHandle;
 use probepath_frames::Stamp;
 
 use crate::PlacedBScan;
-use crate::exam::{Attachment, Event, ExamError, ExamFile, ExamHeader, Level, TickRecord, Written};
+use crate::exam::{Attachment, Event, ExamError, ExamFile, ExamHeader, Level, Surface, TickRecord, Written};
 
 /// Room in the queue: eight seconds at 500 ticks a second.
 const QUEUE: usize = 4096;
@@ -64,6 +64,7 @@ enum Entry {
     BScan(Box<PlacedBScan>),
     Event(Box<Event>),
     Attachment(Box<Attachment>),
+    Surface(Box<Surface>),
     End,
 }
 
@@ -126,6 +127,11 @@ impl ExamWriter {
     pub fn attach(&self, attachment: Attachment) {
         // A thread that is gone says why in `finish`.
         let _ = self.queue.send(Entry::Attachment(Box::new(attachment)));
+    }
+
+    /// Records a surface for viewers; waits for room, so not while an arm moves.
+    pub fn surface(&self, surface: Surface) {
+        let _ = self.queue.send(Entry::Surface(Box::new(surface)));
     }
 
     /// Why nothing is written any more, if so. One atomic load: cheap enough for every tick.
@@ -228,6 +234,7 @@ impl<W: Write> Drain<W> {
             }
             Entry::BScan(placed) => self.file.bscan(placed)?,
             Entry::Event(event) => self.file.event(event)?,
+            Entry::Surface(surface) => self.file.surface(surface)?,
             Entry::Attachment(attachment) => self.file.attach(attachment)?,
             Entry::End => {}
         }
