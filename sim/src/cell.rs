@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use probepath_frames::{Span, Stamp};
 
-pub use config::{ArmConfig, ArmKind, CellConfig, MachineConfig, SubjectConfig, ZoomConfig};
+pub use config::{ArmConfig, ArmKind, CellConfig, MachineConfig, SubjectConfig, Window};
 pub use error::CellError;
 pub use nominal::Nominal;
 pub use scene::Moment;

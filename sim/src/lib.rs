@@ -48,7 +48,7 @@ mod vessel;
 pub use arm::{KinematicError, SensorConfig, SimulatedArm};
 pub use cell::{
     ArmConfig, ArmKind, CellConfig, CellError, MachineConfig, Moment, Nominal, SimulatedCell, SimulatedHand,
-    SubjectConfig, TICK, Truth, ZoomConfig,
+    SubjectConfig, TICK, Truth, Window,
 };
 pub use hand::HandConfig;
 pub use knobs::{ArmKnobs, Interval, Knobs, MachineKnobs, Ticks};

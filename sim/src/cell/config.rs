@@ -104,9 +104,8 @@ pub struct MachineConfig {
     pub depth_mm: f64,
     /// Depth of the transmit focus (mm).
     pub focus_mm: f64,
-    /// Zoom: the window's top and height (mm), as wide as the array at most; without it the picture is the whole
-    /// depth.
-    pub zoom: Option<ZoomConfig>,
+    /// What part of the depth the picture shows.
+    pub window: Window,
     /// How far the calibration that the software knows is from the truth: place (mm), in a direction from the seed.
     pub calibration_error_mm: f64,
     /// And orientation (degrees).
@@ -115,14 +114,19 @@ pub struct MachineConfig {
     pub imaging: ImagingConfig,
 }
 
-/// A zoom window.
+/// What part of the depth the picture shows; never wider than the array.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ZoomConfig {
-    /// Depth of its top under the face (mm).
-    pub top_mm: f64,
-    /// Its height (mm).
-    pub height_mm: f64,
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Window {
+    /// All of it.
+    Whole,
+    /// A window, enlarged.
+    Zoom {
+        /// Depth of its top under the face (mm).
+        top_mm: f64,
+        /// Its height (mm).
+        height_mm: f64,
+    },
 }
 
 impl Default for MachineConfig {
@@ -133,7 +137,7 @@ impl Default for MachineConfig {
             latency_ms: 60.0,
             depth_mm: 70.0,
             focus_mm: 45.0,
-            zoom: Some(ZoomConfig { top_mm: 2.0, height_mm: 40.0 }),
+            window: Window::Zoom { top_mm: 2.0, height_mm: 40.0 },
             calibration_error_mm: 0.2,
             calibration_error_deg: 0.2,
             imaging: ImagingConfig::default(),
@@ -145,11 +149,11 @@ impl CellConfig {
     /// The phantom bench of [P1]: the straight phantom, depth 7 cm, focus 4-5 cm, zoom 3:7 around its vessel; an even
     /// top of 1.5 N/mm; a hand that goes 100 mm along it without mishaps.
     pub fn phantom() -> Self {
-        let zoom = Some(ZoomConfig { top_mm: 16.0, height_mm: 30.0 });
+        let window = Window::Zoom { top_mm: 16.0, height_mm: 30.0 };
         Self {
             subject: SubjectConfig::Phantom(PhantomConfig::default()),
             skin: SkinConfig { friction: 0.06, ..SkinConfig::even(1.5) },
-            machine: MachineConfig { zoom, ..MachineConfig::default() },
+            machine: MachineConfig { window, ..MachineConfig::default() },
             hand: HandConfig { start_mm: 15.0, length_mm: 100.0, mishaps: false, ..HandConfig::default() },
             ..Self::default()
         }
@@ -197,9 +201,9 @@ impl MachineConfig {
         within("machine.focus_mm", self.focus_mm, 1.0, 300.0)?;
         within("machine.calibration_error_mm", self.calibration_error_mm, 0.0, 20.0)?;
         within("machine.calibration_error_deg", self.calibration_error_deg, 0.0, 20.0)?;
-        let Some(zoom) = self.zoom else { return Ok(()) };
-        within("machine.zoom.top_mm", zoom.top_mm, 0.0, self.depth_mm)?;
-        within("machine.zoom.height_mm", zoom.height_mm, 3.0, self.depth_mm - zoom.top_mm)
+        let Window::Zoom { top_mm, height_mm } = self.window else { return Ok(()) };
+        within("machine.window.zoom.top_mm", top_mm, 0.0, self.depth_mm)?;
+        within("machine.window.zoom.height_mm", height_mm, 3.0, self.depth_mm - top_mm)
     }
 }
 

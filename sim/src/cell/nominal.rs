@@ -5,7 +5,7 @@ use probepath_frames::{Base, Flange, Image, Pose, Probe, Span, World};
 use probepath_robot::{Joints, Model, PANDA_URDF, UR5E_URDF};
 use probepath_us_capture::Setting;
 
-use super::config::{ArmKind, CellConfig, MachineConfig, SubjectConfig};
+use super::config::{ArmKind, CellConfig, MachineConfig, SubjectConfig, Window};
 use super::{CellError, TICK};
 use crate::leg::Side;
 use crate::ultrasound::settings;
@@ -158,8 +158,11 @@ impl MachineConfig {
     /// The setting that it describes.
     pub(crate) fn setting(&self) -> Setting {
         let (depth_m, focus_m) = (self.depth_mm * 1e-3, self.focus_mm * 1e-3);
-        let Some(zoom) = self.zoom else { return settings::whole_depth(depth_m, focus_m) };
-        let middle_m = (zoom.top_mm + zoom.height_mm / 2.0) * 1e-3;
-        settings::zoomed(depth_m, focus_m, zoom.height_mm * 1e-3, middle_m)
+        match self.window {
+            Window::Whole => settings::whole_depth(depth_m, focus_m),
+            Window::Zoom { top_mm, height_mm } => {
+                settings::zoomed(depth_m, focus_m, height_mm * 1e-3, (top_mm + height_mm / 2.0) * 1e-3)
+            }
+        }
     }
 }

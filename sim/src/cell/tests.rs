@@ -247,3 +247,22 @@ fn the_surface_that_the_skin_lies_on_is_the_subjects() {
         ) > 0.01
     );
 }
+
+#[test]
+fn a_configuration_goes_to_a_file_and_back() {
+    for config in [CellConfig::default(), CellConfig::phantom()] {
+        let text = toml::to_string(&config).unwrap();
+        assert_eq!(toml::from_str::<CellConfig>(&text).unwrap(), config);
+    }
+}
+
+#[test]
+fn a_short_file_is_enough_and_a_wrong_word_is_refused() {
+    let text = "[arm]\nkind = \"seven_joint\"\nkinematic_error = \"paper\"\n[machine]\nwindow = \"whole\"\n\
+                [knobs.machine]\nstall = { from_s = 3.0, lasts_s = 0.5 }\n";
+    let config: CellConfig = toml::from_str(text).unwrap();
+    assert_eq!(config.arm.kinematic_error, KinematicError::Paper);
+    assert_eq!((config.machine.window, config.arm.kind), (Window::Whole, ArmKind::SevenJoint));
+    let wrong = toml::from_str::<CellConfig>("[machine]\nrate = 25.0\n").unwrap_err().to_string();
+    assert!(wrong.contains("rate_hz"), "{wrong}");
+}

@@ -4,15 +4,21 @@ use nalgebra::{SMatrix, Vector6};
 
 use super::*;
 
-/// The simplest software that gives way: joints move so that the probe's velocity is wrench over damping.
+/// The simplest software that gives way: a mass and a damper, in translation (kg, N s/m) and in rotation.
 struct GivesWay {
     velocity: Vector6<f64>,
+    mass: [f64; 2],
+    damping: [f64; 2],
+    fastest_m_s: f64,
+}
+
+impl Default for GivesWay {
+    fn default() -> Self {
+        Self { velocity: Vector6::zeros(), mass: [2.0, 0.02], damping: [90.0, 0.8], fastest_m_s: 0.1 }
+    }
 }
 
 impl GivesWay {
-    const DAMPING: f64 = 90.0;
-    const TURN_DAMPING: f64 = 0.8;
-
     fn next(&mut self, cell: &SimulatedCell, state: &State) -> Joints {
         if !state.guiding {
             return state.commanded;
@@ -21,10 +27,14 @@ impl GivesWay {
         let pose = nominal.model().forward(&state.commanded) * nominal.flange_from_probe;
         let rotation = pose.isometry().rotation;
         let (force, torque) = (rotation * state.wrench.force, rotation * state.wrench.torque);
-        let linear = (force / Self::DAMPING).cap_magnitude(0.1);
-        let angular = (torque / Self::TURN_DAMPING).cap_magnitude(1.0);
-        let wish = Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z);
-        self.velocity += (wish - self.velocity) * 0.3;
+        let push = [force, torque];
+        for (part, push) in push.iter().enumerate() {
+            let mut velocity = self.velocity.fixed_rows::<3>(3 * part).into_owned();
+            let tau = self.mass[part] / self.damping[part];
+            velocity += (push / self.damping[part] - velocity) * (1.0 - (-0.002 / tau).exp());
+            let fastest = if part == 0 { self.fastest_m_s } else { 1.0 };
+            self.velocity.fixed_rows_mut::<3>(3 * part).copy_from(&velocity.cap_magnitude(fastest));
+        }
         let jacobian = nominal.model().jacobian(&state.commanded, &nominal.flange_from_probe);
         let j = SMatrix::<f64, 6, 6>::from_fn(|row, column| jacobian.column(column)[row]);
         let rates = j.lu().solve(&self.velocity).expect("far from singular");
@@ -36,8 +46,11 @@ impl GivesWay {
 
 /// Guides until the hand lets go; gives the states.
 fn guided(cell: &SimulatedCell) -> Vec<State> {
+    guided_with(cell, GivesWay::default())
+}
+
+fn guided_with(cell: &SimulatedCell, mut software: GivesWay) -> Vec<State> {
     let mut arm = cell.arm();
-    let mut software = GivesWay { velocity: Vector6::zeros() };
     cell.hand().guide();
     let mut state = arm.exchange(&Command::Stay).unwrap();
     let mut states = vec![state];
@@ -133,4 +146,29 @@ fn a_hand_that_is_told_to_lets_go_at_once() {
     cell.hand().let_go();
     let state = arm.exchange(&Command::Stay).unwrap();
     assert!(!state.guiding && cell.truth().now().hand.force.norm() == 0.0);
+}
+
+#[test]
+fn software_that_gives_way_lightly_heavily_or_slowly_is_guided_all_the_same() {
+    for (mass, damping, fastest_m_s) in
+        [(5.0, 40.0, 0.1), (10.0, 100.0, 0.1), (3.0, 300.0, 0.1), (2.0, 80.0, 0.02)]
+    {
+        let software = GivesWay {
+            mass: [mass, 0.01 * mass],
+            damping: [damping, 0.01 * damping],
+            fastest_m_s,
+            ..GivesWay::default()
+        };
+        let config = CellConfig {
+            hand: HandConfig { length_mm: 70.0, ..HandConfig::default() },
+            ..CellConfig::default()
+        };
+        let cell = SimulatedCell::new(&config, 5).unwrap();
+        guided_with(&cell, software);
+        let moments = cell.truth().moments();
+        let on_skin: Vec<_> = moments.iter().filter(|m| m.skin.force.norm() > 0.5).collect();
+        let lowest = on_skin.iter().map(|m| m.world_from_probe.origin().vector().z).fold(0.0, f64::min);
+        let most = on_skin.iter().map(|m| -m.skin.force.z).fold(0.0, f64::max);
+        assert!(lowest < -0.06 && most < 9.0, "{damping} N s/m: {lowest} m, {most} N");
+    }
 }
