@@ -66,6 +66,18 @@ pub enum LimitsError {
         /// The number found.
         value: f64,
     },
+    /// A joint that takes longer to brake than anybody can look ahead.
+    #[error(
+        "joint {joint} takes {ticks:.0} ticks to brake, more than {most}: raise its acceleration and jerk"
+    )]
+    SlowBrake {
+        /// The joint, counted from zero.
+        joint: usize,
+        /// How long it takes.
+        ticks: f64,
+        /// The most allowed.
+        most: usize,
+    },
     /// A tick that takes no time, or more than a second.
     #[error("a tick of {period_s} s: it must be longer than zero and at most 1 s")]
     Period {
@@ -197,6 +209,12 @@ impl Limiter {
             return Err(LimitsError::Period { period_s: dt });
         }
         finite(&position, limits.joints())?;
+        for joint in 0..limits.joints() {
+            let ticks = limits.bounds(joint, dt).ticks_to_brake();
+            if ticks > axis::LONGEST_BRAKE as f64 {
+                return Err(LimitsError::SlowBrake { joint, ticks, most: axis::LONGEST_BRAKE });
+            }
+        }
         Ok(Self { limits, dt, last: [position; 3] })
     }
 

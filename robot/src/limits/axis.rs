@@ -37,8 +37,15 @@ pub(crate) struct Rest {
 /// How often the search for the nearest safe acceleration halves: to 1e-6 of the acceleration limit.
 const HALVINGS: usize = 20;
 
-/// A brake takes `v/a + 2a/j` ticks and a few: far fewer than this for limits that an arm has.
-const LONGEST_BRAKE: usize = 100_000;
+/// The longest brake that is looked ahead: two minutes at 1 kHz, far more than an arm takes.
+pub(crate) const LONGEST_BRAKE: usize = 120_000;
+
+impl Bounds {
+    /// How many ticks a brake takes at most: the acceleration runs out, then comes the trapezoid of the brake.
+    pub(crate) fn ticks_to_brake(&self) -> f64 {
+        self.velocity / self.acceleration + 2.0 * self.acceleration / self.jerk + 5.0
+    }
+}
 
 impl Motion {
     /// The motion after a tick with this acceleration.

@@ -4,7 +4,8 @@ use probepath_frames::{Base, Direction, Point, Probe, Span, Stamp, Wrench, nalge
 
 use super::*;
 use crate::{
-    GuardLimits, Hold, Joints, MotionLimits, Operator, Phase, Plane, PointToPoint, RecordedArm, Workspace,
+    Brake, GuardLimits, Hold, Joints, MotionLimits, Operator, Phase, Plane, PointToPoint, RecordedArm,
+    Workspace,
 };
 
 const PERIOD: Span = Span::from_milliseconds(2);
@@ -217,7 +218,7 @@ fn a_hand_may_pull_harder_than_skin_may_press_and_only_while_it_guides() {
 
 #[test]
 fn the_operator_and_the_observer_stop_in_peace_at_any_tick() {
-    for at in [0, 1, 2, 50, 137, 300, 500] {
+    for at in (0..630).step_by(9) {
         let operator = Operator::new();
         let (mut arm, mut guard) = (TestArm::new(Fails::default()), guard().listening_to(operator.clone()));
         let mut watch = |tick: &Tick| {
@@ -236,6 +237,43 @@ fn the_operator_and_the_observer_stop_in_peace_at_any_tick() {
         let finished = run(&mut arm, &mut there(), &mut guard, &mut ask).unwrap();
         assert_eq!(finished.ending, Ending::Observer("seen".into()));
         check(&arm);
+    }
+}
+
+#[test]
+fn a_hold_holds_for_its_ticks_and_a_brake_ends_at_rest() {
+    let (mut arm, mut guard) = (TestArm::new(Fails::default()), guard());
+    arm.state.commanded = Joints::splat(2, 0.3);
+    arm.state.position = arm.state.commanded;
+    let finished = run(&mut arm, &mut Hold::ticks(100), &mut guard, &mut ()).unwrap();
+    // Three ticks to see that the arm rests, one to stay at the end.
+    assert_eq!(finished.ticks, 104);
+    assert!(arm.rows.iter().all(|(_, state)| state.commanded == Joints::splat(2, 0.3)));
+    let operator = guard.operator().clone();
+    let mut stop = |tick: &Tick| {
+        if tick.index == 50 {
+            operator.stop();
+        }
+        Wish::GoOn
+    };
+    let finished = run(&mut arm, &mut Hold::until_stopped(), &mut guard, &mut stop).unwrap();
+    assert_eq!(finished.ending, Ending::Operator);
+    guard.operator().allow();
+    let mut arm = TestArm::new(Fails::default());
+    let mut brake = Brake::default();
+    let finished = run(&mut arm, &mut Then(there(), 300, &mut brake), &mut guard, &mut ()).unwrap();
+    assert_eq!(finished.ending, Ending::Done);
+    assert!(finished.last.commanded[0] > 0.2 && finished.last.commanded[0] < 0.9);
+    check(&arm);
+}
+
+/// One controller, and after some ticks another.
+struct Then<'a>(PointToPoint, u64, &'a mut dyn Controller);
+
+impl Controller for Then<'_> {
+    fn step(&mut self, state: &State) -> Option<Command> {
+        self.1 = self.1.saturating_sub(1);
+        if self.1 > 0 { self.0.step(state) } else { self.2.step(state) }
     }
 }
 
