@@ -103,7 +103,7 @@ impl ExamWriter {
         let theirs = Arc::clone(&shared);
         let thread = std::thread::Builder::new()
             .name("exam".into())
-            .spawn(move || Drain { file, shared: theirs, told: Lost::default() }.run(&entries))
+            .spawn(move || Drain { file, shared: theirs, told: Lost::default(), refused: None }.run(&entries))
             .map_err(|source| ExamError::Write { ticks: 0, bscans: 0, source: Arc::new(source) })?;
         Ok(Self { queue, thread: Some(thread), pace, shared })
     }
@@ -147,7 +147,8 @@ impl ExamWriter {
     /// Ends the exam and waits until everything is written.
     ///
     /// # Errors
-    /// The first that writing met.
+    /// The first that writing met; or, when only a record was refused (an attachment that is too large), why: the
+    /// rest is in the file.
     pub fn finish(mut self) -> Result<Written, ExamError> {
         self.end().unwrap_or(Err(ExamError::WriterGone))
     }
@@ -209,6 +210,8 @@ struct Drain<W: Write> {
     file: ExamFile<W>,
     shared: Arc<Shared>,
     told: Lost,
+    /// The first record that was refused for what it is, not for the disk.
+    refused: Option<ExamError>,
 }
 
 impl<W: Write> Drain<W> {
@@ -218,9 +221,11 @@ impl<W: Write> Drain<W> {
             if matches!(entry, Entry::End) {
                 break;
             }
-            if let Err(error) = self.write(&entry, &mut now) {
-                // Nothing is written after the first error; the rest is still taken, so that nobody waits for room.
-                let _ = self.shared.fault.set(error);
+            match self.write(&entry, &mut now) {
+                Ok(()) => {}
+                // Nothing is written after this; the rest is still taken, so that nobody waits for room.
+                Err(error @ ExamError::Write { .. }) => drop(self.shared.fault.set(error)),
+                Err(error) => self.refuse(error, now),
             }
         }
         self.end(now)
@@ -257,11 +262,20 @@ impl<W: Write> Drain<W> {
         self.file.event(&Event { stamp: now, level: Level::Error, source: "exam".into(), text })
     }
 
+    /// Says in the file what it does not hold, and keeps the reason for `finish`.
+    fn refuse(&mut self, error: ExamError, now: Stamp) {
+        let event = Event { stamp: now, level: Level::Error, source: "exam".into(), text: error.to_string() };
+        self.refused.get_or_insert(error);
+        if let Err(error) = self.file.event(&event) {
+            let _ = self.shared.fault.set(error);
+        }
+    }
+
     fn end(mut self, now: Stamp) -> Result<Written, ExamError> {
         let fault = self.shared.fault.get().cloned();
         self.tell_lost(now).ok();
         let finished = self.file.finish();
-        match fault {
+        match fault.or(self.refused) {
             Some(error) => Err(error),
             None => finished.map(|(_, written)| written),
         }

@@ -147,3 +147,19 @@ fn a_folder_that_is_not_there_is_named() {
     assert!(error.contains("no/such/folder/exam.mcap"), "{error}");
     assert!(ExamReader::open(path).err().unwrap().to_string().contains("no/such/folder"));
 }
+
+#[test]
+fn an_attachment_that_is_too_large_is_refused_and_the_rest_is_recorded() {
+    let disk = Shared::default();
+    let writer = ExamWriter::new(disk.clone(), &header(), Pace::Simulated).unwrap();
+    let mut noise = Noise(1);
+    writer.tick(tick(0, &mut noise));
+    writer.attach(Attachment::report(vec![b' '; 33 << 20]));
+    writer.tick(tick(1, &mut noise));
+    let error = writer.finish().unwrap_err();
+    assert!(matches!(&error, ExamError::TooLarge { .. }), "{error}");
+    let bytes = disk.bytes();
+    let exam = Exam::collect(ExamReader::new(bytes.as_slice(), "a test").unwrap()).unwrap();
+    assert_eq!((exam.ticks.len(), exam.attachments.len(), exam.ending), (2, 0, Ending::Complete));
+    assert!(exam.events[0].text.contains("report.html has 34603008 bytes"), "{:?}", exam.events);
+}
