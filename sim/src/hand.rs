@@ -52,15 +52,16 @@ const SPRING_N_M: f64 = 400.0;
 const DAMPER_N_S_M: f64 = 12.0;
 const TURN_SPRING_N_M: f64 = 8.0;
 const TURN_DAMPER_N_M_S: f64 = 0.15;
-const STRONGEST_N: f64 = 40.0;
-const STRONGEST_N_M: f64 = 5.0;
+const STRONGEST_N: f64 = 12.0;
+const STRONGEST_N_M: f64 = 2.0;
 /// Height over the skin from which it comes down, and to which it rises at the end (m).
 const HOVER_M: f64 = 0.040;
 /// Its speed through the air (m/s), and down to the skin (m/s).
 const AIR_M_S: f64 = 0.060;
 const DOWN_M_S: f64 = 0.015;
-/// A hand slows when the probe is left behind: at this distance (m) it waits.
-const WAITS_AT_M: f64 = 0.050;
+/// A hand feels that it drags and slows down, when the probe is left behind by more than this (m); at three times it
+/// waits.
+const SLOWS_AT_M: f64 = 0.010;
 /// How fast it presses deeper for each newton that it misses (m/(N s)), and at most (m).
 const PRESS_M_N_S: f64 = 0.004;
 const DEEPEST_M: f64 = 0.045;
@@ -178,12 +179,21 @@ impl Hand {
             return Grip { wrench: Wrench::zero(), guiding: false };
         }
         let target = self.target();
-        let left_behind = target.origin().distance(&probe.origin());
-        let pace = (1.5 - left_behind / (WAITS_AT_M / 1.5)).clamp(0.0, 1.0);
+        let pace = self.pace(&target, probe);
         self.clock_s += seconds;
         self.advance(skin_n, pace, seconds);
         let wrench = self.pull(&target, probe, twist, seconds);
         Grip { wrench, guiding: self.guides() }
+    }
+
+    /// How much of its speed it keeps (0 to 1): less where the probe is left behind. What it presses on the skin with
+    /// is no dragging.
+    fn pace(&self, target: &Pose<World, Probe>, probe: &Pose<World, Probe>) -> f64 {
+        let mut behind = (probe.inverse() * target.origin()).vector();
+        if matches!(self.phase, Phase::Follow { .. }) {
+            behind.z = 0.0;
+        }
+        (1.5 - behind.norm() / (2.0 * SLOWS_AT_M)).clamp(0.0, 1.0)
     }
 
     /// Where the spring's end is now.
