@@ -238,6 +238,27 @@ fn a_file_that_cannot_be_read_is_refused_by_name() {
     assert!(error.starts_with("no/such.urdf: cannot be read"), "{error}");
 }
 
+#[test]
+fn a_file_without_end_is_refused() {
+    let zero = std::path::Path::new("/dev/zero");
+    if !zero.exists() {
+        println!("skipped: this system has no /dev/zero");
+        return;
+    }
+    let error = Model::from_urdf_file(zero, "a", "b").unwrap_err().to_string();
+    assert!(error.contains("longer than 32 MiB"), "{error}");
+}
+
+#[test]
+fn the_ends_of_a_urdf_are_its_root_and_its_tips_the_longest_first() {
+    let (root, tips) = Model::ends_of_urdf(GANTRY, "gantry.urdf").unwrap();
+    assert_eq!((root.as_str(), tips), ("floor", vec!["flange".to_owned(), "camera".to_owned()]));
+    let (root, tips) = Model::ends_of_urdf(UR5E_URDF, "ur5e.urdf").unwrap();
+    assert_eq!((root.as_str(), tips), ("base_link", vec!["tool0".to_owned()]));
+    let ring = two(GOOD, GOOD).replace("<parent link='a'/>", "<parent link='c'/>");
+    assert!(matches!(Model::ends_of_urdf(&ring, "ring.urdf"), Err(ModelError::Loop { .. })));
+}
+
 /// Numbers that look random and are the same on every machine (SplitMix64).
 struct Seeded(u64);
 

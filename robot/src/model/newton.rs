@@ -18,6 +18,9 @@ const MOST_STEPS: usize = 8;
 /// division by zero.
 const DAMPING: f64 = 1e-14;
 
+/// Joints that are further than this (rad, m) from where the arm is are another posture, not the next tick.
+const NEAR: f64 = 0.5;
+
 /// A joint may be this far outside its limit (rad, m): rounding, no more.
 pub(super) const LIMIT_SLACK: f64 = 1e-9;
 
@@ -26,7 +29,8 @@ impl Model {
     /// the joints that does it, for tracking a path tick by tick. No heap.
     ///
     /// `None` when no such joints are found in a few Newton steps: the pose is not near, out of reach, or the arm is
-    /// at a singularity; and when they are outside the limits.
+    /// at a singularity; when they are outside the limits; and when a joint would have to move by more than 0.5 rad
+    /// (0.5 m), because that is another posture and not the next tick.
     pub fn refine<T: Frame>(
         &self,
         base_from_tool: &Pose<Base, T>,
@@ -34,7 +38,8 @@ impl Model {
         near: &Joints,
     ) -> Option<Joints> {
         let q = self.newton(base_from_tool.isometry(), flange_from_tool.isometry(), near, MOST_STEPS)?;
-        self.outside_limits(&q, LIMIT_SLACK).is_none().then_some(q)
+        let near = q.zip(near, |q, near| q - near).largest() <= NEAR;
+        (near && self.outside_limits(&q, LIMIT_SLACK).is_none()).then_some(q)
     }
 
     /// Newton's method on the pose, without regard for limits.

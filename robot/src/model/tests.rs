@@ -97,6 +97,15 @@ fn seeded_like(x: f64) -> f64 {
 }
 
 #[test]
+fn another_posture_is_not_the_next_tick() {
+    let arm = Model::ur5e();
+    let near = Joints::from_slice(&[0.0, -1.2, 1.4, -1.6, -1.5, 0.0]).unwrap();
+    let goal = |by: f64| arm.forward(&near.zip(&near, |q, _| q + by)) * tool();
+    assert!(arm.refine(&goal(0.1), &tool(), &near).is_some());
+    assert_eq!(arm.refine(&goal(0.8), &tool(), &near), None);
+}
+
+#[test]
 fn joints_of_another_length_give_a_pose_that_is_not_finite() {
     assert!(!Model::ur5e().forward(&Joints::zeros(MAX_JOINTS)).is_finite());
 }

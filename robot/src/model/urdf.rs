@@ -4,12 +4,16 @@
 //! checked here.
 
 use std::collections::HashMap;
+use std::io::Read;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use urdf_rs::{Joint, JointType, Robot};
 
 use super::{JointLimit, Model, ModelError, ModelWarning, Value, chain, mesh, text};
+
+/// The longest file that is read: the longest URDFs of whole humanoids are a hundred times shorter.
+const MAX_BYTES: u64 = 32 << 20;
 
 /// An arm is metres long: a kilometre is a wrong unit or a damaged number.
 const MAX_LENGTH_M: f64 = 1000.0;
@@ -47,11 +51,49 @@ impl Model {
         base_link: &str,
         tip_link: &str,
     ) -> Result<(Self, Vec<ModelWarning>), ModelError> {
-        let file = path.display().to_string();
-        let text = std::fs::read_to_string(path)
-            .map_err(|cause| ModelError::Unreadable { file: file.clone(), why: cause.to_string() })?;
-        Self::from_urdf(&text, &file, base_link, tip_link)
+        let text = read(path)?;
+        Self::from_urdf(&text, &path.display().to_string(), base_link, tip_link)
     }
+
+    /// The root link of a URDF and, of its tree, the links that nothing hangs from: what to offer a person as base and
+    /// tip. The tip with the most moving joints below the root comes first.
+    ///
+    /// # Errors
+    /// When the text is no URDF, its names do not fit, or its joints are a ring.
+    pub fn ends_of_urdf(text: &str, source: &str) -> Result<(String, Vec<String>), ModelError> {
+        let robot = parse(text, source)?;
+        let tree = Tree::of(&robot, source)?;
+        let holds = |link: &str| robot.joints.iter().any(|joint| joint.parent.link == link);
+        let mut tips = Vec::new();
+        if let Some(ring) = robot.links.iter().find_map(|link| tree.way_up(&link.name).err()) {
+            return Err(ring);
+        }
+        for link in robot.links.iter().filter(|link| !holds(&link.name)) {
+            let way = tree.way_up(&link.name)?;
+            let moving =
+                way.iter().filter(|joint| joint.joint_type != JointType::Fixed && joint.mimic.is_none());
+            let root = way.last().map_or(&link.name, |top| &top.parent.link);
+            tips.push((moving.count(), root, &link.name));
+        }
+        // Stable, so that of equals the first in the file stays first.
+        tips.sort_by_key(|(moving, _, _)| std::cmp::Reverse(*moving));
+        let root = tips.first().map(|(_, root, _)| (*root).clone()).unwrap_or_default();
+        let tips =
+            tips.iter().filter(|(_, top, _)| **top == root).map(|(_, _, tip)| (*tip).clone()).collect();
+        Ok((root, tips))
+    }
+}
+
+fn read(path: &Path) -> Result<String, ModelError> {
+    let unreadable = |why: String| ModelError::Unreadable { file: path.display().to_string(), why };
+    let file = std::fs::File::open(path).map_err(|cause| unreadable(cause.to_string()))?;
+    let mut text = String::new();
+    let length =
+        file.take(MAX_BYTES + 1).read_to_string(&mut text).map_err(|cause| unreadable(cause.to_string()))?;
+    if length as u64 > MAX_BYTES {
+        return Err(unreadable("it is longer than 32 MiB, which no URDF is".into()));
+    }
+    Ok(text)
 }
 
 fn parse(text: &str, source: &str) -> Result<Robot, ModelError> {
@@ -140,14 +182,15 @@ impl<'a> Tree<'a> {
             way.push(*joint);
             here = &joint.parent.link;
             if way.len() > self.robot.joints.len() {
-                return Err(ModelError::Loop {
-                    file: self.file.into(),
-                    joint: joint.name.clone(),
-                    link: here.into(),
-                });
+                return Err(self.looped(joint));
             }
         }
         Ok(way)
+    }
+
+    fn looped(&self, joint: &Joint) -> ModelError {
+        let (file, link) = (self.file.into(), joint.parent.link.clone());
+        ModelError::Loop { file, joint: joint.name.clone(), link }
     }
 
     pub(super) fn number(
