@@ -55,6 +55,12 @@
 //! damaged chunk is named and stepped over; a full disk is an error that leaves what was written readable. Chunks
 //! depend on content alone, never on a clock or on threads: the same calls give the same bytes.
 //!
+//! # What it costs
+//!
+//! Measured by `--example exam_size` (dev profile, 2 busy cores): a minute of ticks at 500 a second is 6.9 MB, a B-scan
+//! of 640 x 480 about 0.24 MB; handing a tick over takes 0.05 us (p99 0.15), writing it 5 to 8 us of the other thread.
+//! Reading the 293 MB of a minute with 1,200 B-scans took 9 MB of memory.
+//!
 //! What it does not do: know any robot (a [`Row`] is plain numbers), or hold anybody's name.
 
 mod channels;
