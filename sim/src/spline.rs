@@ -6,6 +6,9 @@ use nalgebra::Vector3;
 /// speed within 1e-4 of one.
 const KNOT_SPACING_M: f64 = 4e-3;
 
+/// A step of the nearest point's search after which the next would be below 1e-8 m.
+const NEAREST_STEP_M: f64 = 3e-5;
+
 /// A C2 curve through points in space: a cubic spline whose parameter is its arc length.
 ///
 /// Beyond its ends it goes on straight.
@@ -59,20 +62,23 @@ impl Curve {
         Jet { at: at + first * (s - inside), first, second: m0 * a + m1 * b }
     }
 
-    /// Arc length of the point of the curve that is nearest to `to`, within its ends.
-    pub(crate) fn nearest(&self, to: &Vector3<f64>) -> f64 {
+    /// Arc length of the point of the curve that is nearest to `to`, within its ends, and the way from there to `to`.
+    pub(crate) fn nearest(&self, to: &Vector3<f64>) -> (f64, Vector3<f64>) {
         let mut s = self.guess(to);
-        for _ in 0..4 {
+        for _ in 0..8 {
             let jet = self.jet(s);
             let off = to - jet.at;
             // Newton, held to descent where `to` lies beyond the centre of curvature.
             let step = off.dot(&jet.first) / (1.0 - off.dot(&jet.second)).max(0.5);
-            s = (s + step).clamp(0.0, self.length());
-            if step.abs() < 1e-7 {
-                break;
+            let moved = (s + step).clamp(0.0, self.length());
+            let by = moved - s;
+            s = moved;
+            if by.abs() < NEAREST_STEP_M {
+                // What is left is of second order: the tangent and the bend reach it.
+                return (s, off - jet.first * by - jet.second * (0.5 * by * by));
             }
         }
-        s
+        (s, to - self.jet(s).at)
     }
 
     fn guess(&self, to: &Vector3<f64>) -> f64 {
@@ -266,7 +272,9 @@ mod tests {
             let angle = f64::from(i) * 2.4;
             let off = Vector3::new(angle.cos(), angle.sin(), 0.3 * (angle * 3.0).sin()) * 8e-3;
             let point = curve.jet(s).at + off;
-            let found = (curve.jet(curve.nearest(&point)).at - point).norm();
+            let (at, way) = curve.nearest(&point);
+            let found = (curve.jet(at).at - point).norm();
+            assert!((way.norm() - found).abs() < 1e-9);
             let searched = (0..400)
                 .map(|k| {
                     (curve.jet((s - 0.02 + 1e-4 * f64::from(k)).clamp(0.0, curve.length())).at - point).norm()

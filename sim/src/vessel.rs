@@ -200,15 +200,14 @@ impl Vessel {
 
     /// Arc length of the point of the centreline nearest to `point` (m).
     pub fn nearest(&self, point: Point<World>) -> f64 {
-        self.curve.nearest(&point.vector())
+        self.curve.nearest(&point.vector()).0
     }
 
     /// Distance from `point` to the lumen's wall, measured normal to the centreline (m): negative in the lumen,
     /// zero exactly on its wall.
     pub fn wall_distance(&self, point: Point<World>) -> f64 {
-        let at = point.vector();
-        let s = self.curve.nearest(&at);
-        (at - self.curve.jet(s).at).norm() - self.radius(s)
+        let (s, way) = self.curve.nearest(&point.vector());
+        way.norm() - self.radius(s)
     }
 
     /// The widest free radius (m).

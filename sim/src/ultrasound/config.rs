@@ -92,7 +92,7 @@ impl Contact {
 impl Default for ImagingConfig {
     fn default() -> Self {
         Self {
-            lattice_m: 0.3e-3,
+            lattice_m: 0.35e-3,
             lumen: 0.02,
             wall: 1.2,
             wall_thickness_m: 0.8e-3,

@@ -6,6 +6,8 @@ use super::config::{Contact, ImagingConfig};
 use super::grid::Grid;
 use super::hash;
 
+/// What sets the noise apart from the speckle of the same seed.
+const NOISE: u64 = 0x6e6f_6973_6521_2121;
 /// Entries of the table of normal quantiles.
 const QUANTILES: usize = 4096;
 
@@ -25,7 +27,7 @@ impl Display {
             (255.0 * (1.0 + decibel / config.dynamic_range_db)).round() as u8
         });
         let normal = (0..QUANTILES).map(|i| normal_quantile((i as f64 + 0.5) / QUANTILES as f64) as f32);
-        Self { grey: grey.collect(), normal: normal.collect(), noise_seed: hash::mix(seed ^ 0x6e6f_6973_65) }
+        Self { grey: grey.collect(), normal: normal.collect(), noise_seed: hash::mix(seed ^ NOISE) }
     }
 
     pub(super) fn grey(&self, power: f32) -> u8 {

@@ -10,7 +10,7 @@ use crate::tissue::Tissue;
 
 /// Nodes of the distance are this far apart (m), in plane and across it.
 const NODE_M: f64 = 0.5e-3;
-const NODE_ACROSS_M: f64 = 1.0e-3;
+const NODE_ACROSS_M: f64 = 1.25e-3;
 /// Cells along a block's edge.
 const CELLS: usize = 8;
 const BLOCK_M: f64 = NODE_M * CELLS as f64;
@@ -83,16 +83,16 @@ impl<'a> Section<'a> {
 
     /// Distances in every block that a wall or lumen may reach into.
     fn distances(&self, wall: f64, distance: &(dyn Fn(Point<World>) -> f64 + Sync)) -> Distances {
-        let half_across = 0.5 * (self.slab.to[2] - self.slab.from[2]);
-        let reach = Vector3::new(BLOCK_M / 2.0, BLOCK_M / 2.0, half_across + NODE_ACROSS_M).norm() * STEEPEST;
+        // Three looks through the slab, each for a third of its thickness.
+        let thick = self.slab.to[2] - self.slab.from[2];
+        let looks = [1.0, 3.0, 5.0].map(|sixths| self.slab.from[2] + thick * sixths / 6.0);
+        let half = Vector3::new(BLOCK_M / 2.0, BLOCK_M / 2.0, thick / 6.0 + NODE_ACROSS_M / 2.0);
+        let reach = wall + half.norm() * STEEPEST;
         let blocks = (0..self.blocks[0] * self.blocks[1]).into_par_iter().map(|block| {
             let corner = self.corner(block);
-            let middle = [
-                corner[0] + BLOCK_M / 2.0,
-                corner[1] + BLOCK_M / 2.0,
-                0.5 * (self.slab.from[2] + self.slab.to[2]),
-            ];
-            (distance(self.point(middle)) <= wall + reach).then(|| self.nodes(corner, distance))
+            let middle = corner.map(|from| from + BLOCK_M / 2.0);
+            let near = |z: &f64| distance(self.point([middle[0], middle[1], *z])) <= reach;
+            looks.iter().any(near).then(|| self.nodes(corner, distance))
         });
         Distances { blocks: blocks.collect(), wall }
     }
