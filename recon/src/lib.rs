@@ -3,9 +3,11 @@
 //! It never hears of robots.
 
 mod centreline;
+mod compare;
 mod error;
 pub mod fast_marching;
 mod lumen;
+mod mesh;
 mod patch;
 mod reconstruct;
 mod section;
@@ -18,8 +20,10 @@ mod surface;
 mod phantom_images;
 
 pub use centreline::{Centreline, CentrelinePoint};
+pub use compare::{AreaPair, Closest, CompareError, Comparison, DistanceStatistics, Fit, Nearest, compare};
 pub use error::ReconError;
 pub use lumen::{Contour, ImageLumen, NoLumen, segment};
+pub use mesh::{Mesh, MeshError};
 pub use reconstruct::{ImageCounts, LumenReconstruction, ReconWarning, reconstruct_lumen};
 pub use section::{Section, SectionMeasure};
 pub use settings::{LumenSettings, PointSpread, SeedPoint};

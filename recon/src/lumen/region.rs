@@ -20,8 +20,6 @@ pub(crate) struct Region {
     pub(crate) radii: Vec<f64>,
     /// Its area over the area inside `radii`: well above 1 where it runs on into a branch.
     pub(crate) excess: f64,
-    /// How much darker it is than what surrounds it (dB).
-    pub(crate) contrast_db: f64,
 }
 
 /// Decibels of lumen and tissue, as normal distributions.
@@ -44,7 +42,7 @@ pub(crate) fn grow(patch: &Patch, seed: (f64, f64)) -> Result<Region, NoLumen> {
     let first = fill(patch, &db, start, &statistics);
     statistics.lumen = moments(first.iter().map(|&cell| db[cell]));
     let cells = fill(patch, &db, start, &statistics);
-    describe(patch, &cells, contrast_db)
+    describe(patch, &cells)
 }
 
 /// The darkest cell within `reach` of a place.
@@ -123,7 +121,7 @@ fn speed(grid: &MarchGrid, db: &[f64], statistics: &Statistics) -> Vec<f64> {
 }
 
 /// Centre and border of the filled cells.
-fn describe(patch: &Patch, cells: &[usize], contrast_db: f64) -> Result<Region, NoLumen> {
+fn describe(patch: &Patch, cells: &[usize]) -> Result<Region, NoLumen> {
     let area = cells.len() as f64 * patch.cell.0 * patch.cell.1;
     let mut filled = vec![false; patch.power.len()];
     cells.iter().for_each(|&cell| filled[cell] = true);
@@ -144,7 +142,7 @@ fn describe(patch: &Patch, cells: &[usize], contrast_db: f64) -> Result<Region, 
     let far = 1.6 * sorted[RAYS / 2];
     let radii: Vec<f64> = (0..RAYS).map(|ray| median_round(&raw, ray).min(far)).collect();
     let inside: f64 = radii.iter().map(|r| r * r).sum::<f64>() * std::f64::consts::PI / RAYS as f64;
-    Ok(Region { centre, radii, excess: area / inside.max(1e-12), contrast_db })
+    Ok(Region { centre, radii, excess: area / inside.max(1e-12) })
 }
 
 fn on_edge(patch: &Patch, cell: usize) -> bool {

@@ -1,0 +1,169 @@
+//! How far a surface is from a gold standard: the paper's rigid fit and error map ([P1] II.C.3, eq. 6).
+
+mod closest;
+mod fit;
+mod slices;
+
+use nalgebra::{Isometry3, Vector3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+pub use closest::{Closest, Nearest};
+
+use crate::Mesh;
+
+/// Planes in which areas are compared.
+const SLICES: usize = 100;
+
+/// Whether the surface is laid on the gold standard first.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Fit {
+    /// Centre of gravity, then the rigid motion that minimises the distances ([P1] II.C.3).
+    #[default]
+    Rigid,
+    /// The rigid motion that minimises the distances, from where both lie: for surfaces already in one system.
+    Near,
+    /// Not at all: how far is it from where it should be.
+    None,
+}
+
+/// A surface beside its gold standard. All distances are exact, from points to triangles.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Comparison {
+    /// The rigid motion that laid the surface on the gold standard (m). It takes coordinates of the surface's file to the
+    /// gold standard's: bare, because files' axes are whatever they are.
+    pub gold_from_surface: Isometry3<f64>,
+    /// Distance of every point of the surface from the gold standard (mm): the error map, [P1] eq. 6.
+    pub error_mm: Vec<f64>,
+    /// Statistics of the error map.
+    pub error: DistanceStatistics,
+    /// The way back: distance from the surface of the gold standard's points, those beside the surface (a scan of a part
+    /// of the vessel is not blamed for the rest).
+    pub gold_error: DistanceStatistics,
+    /// The larger of both largest distances (mm).
+    pub hausdorff_mm: f64,
+    /// Areas in planes across, from one end to the other.
+    pub areas: Vec<AreaPair>,
+    /// Mean of the relative differences of area, with sign: negative when the surface is too small (%).
+    pub area_error_percent: f64,
+    /// Mean of their magnitudes (%).
+    pub area_error_abs_percent: f64,
+}
+
+/// What a set of distances comes to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DistanceStatistics {
+    /// How many.
+    pub count: usize,
+    /// Mean (mm).
+    pub mean_mm: f64,
+    /// Standard deviation (mm).
+    pub sd_mm: f64,
+    /// Root of the mean square (mm).
+    pub rms_mm: f64,
+    /// 95 of 100 are below (mm).
+    pub p95_mm: f64,
+    /// The largest: the one-sided Hausdorff distance (mm).
+    pub max_mm: f64,
+}
+
+/// Both areas in one plane.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AreaPair {
+    /// Place of the plane along the surface, from its first end (mm).
+    pub at_mm: f64,
+    /// The surface's area (mm2).
+    pub surface_mm2: f64,
+    /// The gold standard's (mm2).
+    pub gold_mm2: f64,
+}
+
+/// Why two surfaces cannot be compared.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum CompareError {
+    /// One of them is no surface.
+    #[error("the {which} has {points} points and {triangles} triangles: nothing to compare")]
+    Empty {
+        /// Which.
+        which: &'static str,
+        /// Points it has.
+        points: usize,
+        /// Triangles it has.
+        triangles: usize,
+    },
+    /// A number that is not finite.
+    #[error("the {which} has a point that is not finite, or a triangle of a point that is not there")]
+    Broken {
+        /// Which.
+        which: &'static str,
+    },
+}
+
+/// Lays `surface` on `gold` as `fit` says and measures every distance.
+///
+/// # Errors
+/// When one of them is empty or has numbers that are not finite.
+pub fn compare(surface: &Mesh, gold: &Mesh, fit: Fit) -> Result<Comparison, CompareError> {
+    check(surface, "surface")?;
+    check(gold, "gold standard")?;
+    let on_gold = Nearest::new(gold);
+    let gold_from_surface = fit::rigid(surface, gold, &on_gold, fit);
+    let mut laid = surface.clone();
+    laid.points.iter_mut().for_each(|p| *p = gold_from_surface.transform_point(&(*p).into()).coords);
+    let error_mm = distances_mm(&on_gold, &laid.points);
+    let axis = fit::Axis::of(&laid);
+    let beside: Vec<Vector3<f64>> = gold.points.iter().copied().filter(|p| axis.is_beside(p)).collect();
+    let gold_error = statistics(&distances_mm(&Nearest::new(&laid), &beside));
+    let error = statistics(&error_mm);
+    let areas = slices::areas(&laid, gold, &axis, SLICES);
+    let relative = areas.iter().map(|pair| 100.0 * (pair.surface_mm2 / pair.gold_mm2 - 1.0));
+    let count = areas.len().max(1) as f64;
+    Ok(Comparison {
+        gold_from_surface,
+        hausdorff_mm: error.max_mm.max(gold_error.max_mm),
+        area_error_percent: relative.clone().sum::<f64>() / count,
+        area_error_abs_percent: relative.map(f64::abs).sum::<f64>() / count,
+        error_mm,
+        error,
+        gold_error,
+        areas,
+    })
+}
+
+fn check(mesh: &Mesh, which: &'static str) -> Result<(), CompareError> {
+    let (points, triangles) = (mesh.points.len(), mesh.triangles.len());
+    if points == 0 || triangles == 0 {
+        return Err(CompareError::Empty { which, points, triangles });
+    }
+    let finite = mesh.points.iter().all(|p| p.iter().all(|x| x.is_finite()));
+    let named = mesh.triangles.iter().flatten().all(|&k| (k as usize) < points);
+    if finite && named { Ok(()) } else { Err(CompareError::Broken { which }) }
+}
+
+fn distances_mm(nearest: &Nearest<'_>, points: &[Vector3<f64>]) -> Vec<f64> {
+    points.par_iter().map(|p| nearest.to(p).distance * 1e3).collect()
+}
+
+fn statistics(distances: &[f64]) -> DistanceStatistics {
+    let mut sorted = distances.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let Some(&max_mm) = sorted.last() else { return DistanceStatistics::default() };
+    let n = sorted.len() as f64;
+    let mean_mm = sorted.iter().sum::<f64>() / n;
+    let square = sorted.iter().map(|d| d * d).sum::<f64>() / n;
+    // The nearest rank: the smallest distance that 95 of 100 do not exceed.
+    let rank = (0.95 * n).ceil() as usize;
+    DistanceStatistics {
+        count: sorted.len(),
+        mean_mm,
+        sd_mm: (square - mean_mm * mean_mm).max(0.0).sqrt(),
+        rms_mm: square.sqrt(),
+        p95_mm: sorted.get(rank.saturating_sub(1)).copied().unwrap_or(max_mm),
+        max_mm,
+    }
+}
+
+#[cfg(test)]
+mod tests;
