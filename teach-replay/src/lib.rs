@@ -2,8 +2,16 @@
 
 mod error;
 mod path;
+mod plan;
+mod probe_arm;
 mod recording;
+mod replay;
 
 pub use error::PathError;
-pub use path::{Bridge, Cleaning, CleaningReport, ContactSign, Label, Path, PathPoint, Side, TaughtForce};
+pub use path::{
+    Bridge, Cleaning, CleaningReport, ContactSign, Label, Listed, Path, PathPoint, Side, TaughtForce,
+};
+pub use plan::{Place, Plan, PlanError, PlanReport, PlanSettings, Refusal};
+pub use probe_arm::ProbeArm;
 pub use recording::{Recording, Sample};
+pub use replay::{Replay, ReplayEnding, ReplayError, ReplayPhase, ReplaySettings, ReplayStatus, ReplayWatch};

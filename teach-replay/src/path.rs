@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 
 pub use clean::{Bridge, Cleaning, CleaningReport};
 pub use contact::ContactSign;
+pub use file::Listed;
 
 use crate::PathError;
 

@@ -110,6 +110,18 @@ impl PathLimits {
         Ok(Self::of(step, &slopes(step, postures), limits, wanted))
     }
 
+    /// The same speed over `length`, whatever moves along it: for the time of a motion that is already planned, in
+    /// seconds for metres.
+    ///
+    /// # Errors
+    /// When a number is not above zero.
+    pub fn uniform(length: f64, wanted: PathSpeed) -> Result<Self, TimingError> {
+        let still = Joints::zeros(0);
+        let limits =
+            MotionLimits { lower: still, upper: still, velocity: still, acceleration: still, jerk: still };
+        Self::new(length / 3.0, &[still; 4], &limits, wanted)
+    }
+
     fn of(step: f64, slopes: &[Slope], limits: &MotionLimits, wanted: PathSpeed) -> Self {
         let steepest = slopes.iter().fold(wanted, |least, slope| PathSpeed {
             acceleration: least.acceleration.min(HALF * least_of(&limits.acceleration, &slope[0])),
@@ -176,7 +188,8 @@ fn slopes(step: f64, postures: &[Joints]) -> Vec<Slope> {
             .fold(zero, |sum, (off, w)| sum.zip(at(i + off), |a, b| a + w * b))
             .map(|x| (x / scale).abs())
     };
-    let edge = |i: isize, n: isize| i.clamp(n.min(last as isize), (last as isize - n).max(0));
+    // Four postures at least: there is always room from one after the first to two before the last.
+    let edge = |i: isize, room: isize| i.clamp(1, last as isize - room);
     let own: Vec<Slope> = (0..=last as isize)
         .map(|i| {
             [

@@ -18,6 +18,9 @@ const ENDING: &str = ".path.toml";
 /// How far two neighbours' distance may be from the spacing, as a fraction.
 const UNIFORM_WITHIN: f64 = 0.02;
 
+/// A file of a folder, and the path in it or what is wrong with it.
+pub type Listed = (PathBuf, Result<Path, PathError>);
+
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Document {
@@ -102,7 +105,7 @@ impl Path {
     ///
     /// # Errors
     /// When the folder cannot be read; a file that is no path is an error of its own, in the list.
-    pub fn list(folder: &FilePath) -> Result<Vec<(PathBuf, Result<Self, PathError>)>, PathError> {
+    pub fn list(folder: &FilePath) -> Result<Vec<Listed>, PathError> {
         let failed = |why| PathError::Io { file: folder.into(), verb: "list", why };
         let mut files = Vec::new();
         for entry in fs::read_dir(folder).map_err(failed)? {

@@ -141,6 +141,20 @@ fn four_thousand_postures_are_timed_quickly_and_the_same_each_time() {
 }
 
 #[test]
+fn four_postures_are_enough_and_a_uniform_speed_needs_none() {
+    let joints = limits(1.0, 5.0, 50.0);
+    let some: Vec<Joints> = (0..4).map(|i| Joints::splat(3, 1e-3 * f64::from(i))).collect();
+    let limits = PathLimits::new(STEP, &some, &joints, PathSpeed::gentle(0.01)).unwrap();
+    assert!((limits.slowest().1 - 0.01).abs() < 1e-12);
+    let mut clock =
+        PathClock::new(PathLimits::uniform(2.0, PathSpeed { speed: 1.0, ..PathSpeed::gentle(1.0) }).unwrap());
+    while !clock.has_arrived() {
+        assert!(clock.step(1.0, DT) <= 2.0);
+    }
+    assert!(clock.at() > 1.99);
+}
+
+#[test]
 fn numbers_that_cannot_be_are_refused() {
     let joints = limits(1.0, 5.0, 50.0);
     let some = vec![Joints::zeros(3); 5];

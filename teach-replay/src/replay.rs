@@ -1,0 +1,345 @@
+//! [`Replay`]: through the air, down, along the path at constant force, and up.
+
+mod contact;
+mod status;
+
+use probepath_robot::motion::follow::Curve;
+use probepath_robot::motion::timing::PathClock;
+use probepath_robot::{
+    Asked, Command, ContactError, ContactLaw, ContactSettings, Controller, Joints, Operator, State,
+};
+use thiserror::Error;
+
+use crate::Plan;
+use crate::plan::Leg;
+use crate::probe_arm::along_z;
+use contact::Touch;
+use status::Board;
+pub use status::{ReplayEnding, ReplayPhase, ReplayStatus, ReplayWatch};
+
+/// How the skin is touched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReplaySettings {
+    /// The force to hold (N).
+    pub force_n: f64,
+    /// Above it the motion along the path waits until the force has been given way to (N).
+    pub soft_limit_n: f64,
+    /// Speed of the descent through the air, and of the lift (m/s).
+    pub air_speed: f64,
+    /// Speed of the descent where the skin may be (m/s).
+    pub touch_speed: f64,
+    /// How far before the path's own height the skin may be (m).
+    pub skin_within: f64,
+    /// Contact begins above it (N).
+    pub touch_n: f64,
+    /// Rate at which the force is raised to the one to hold (N/s).
+    pub ramp_n_s: f64,
+    /// Contact is lost below it (N) ...
+    pub lost_below_n: f64,
+    /// ... for so long (s).
+    pub lost_after: f64,
+    /// How long the force may take to settle (s).
+    pub settle_within: f64,
+    /// Speed along the path at first after a pause (m/s).
+    pub resume_speed: f64,
+    /// The law that holds the force; its lowest and highest offset come from the plan.
+    pub law: ContactSettings,
+}
+
+impl Default for ReplaySettings {
+    fn default() -> Self {
+        Self {
+            force_n: 5.0,
+            soft_limit_n: 10.0,
+            air_speed: 0.02,
+            touch_speed: 0.006,
+            skin_within: 0.02,
+            touch_n: 0.8,
+            ramp_n_s: 4.0,
+            lost_below_n: 0.4,
+            lost_after: 0.1,
+            settle_within: 10.0,
+            resume_speed: 0.01,
+            law: ContactSettings::default(),
+        }
+    }
+}
+
+/// A replay that cannot begin.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum ReplayError {
+    /// A setting that cannot be.
+    #[error("{name} = {value} cannot be: {why}")]
+    Setting {
+        /// Its name.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it has to be.
+        why: &'static str,
+    },
+    /// The contact's law refuses its settings.
+    #[error("{0}")]
+    Law(#[from] ContactError),
+}
+
+/// Where a replay is.
+#[derive(Clone, Copy, Debug)]
+enum Stage {
+    Approach { leg: usize },
+    Descend,
+    Settle { set_n: f64, ticks: u32, steady: u32 },
+    Follow { cap: f64, yielding: bool },
+    Lift { ending: ReplayEnding },
+    Done,
+}
+
+/// Replays a plan. What it commands lies on the path but for the offset along the probe's axis.
+///
+/// ```text
+///  Approach ──▶ Descend ──▶ Settle ──▶ Follow ──▶ Lift ──▶ Done
+///  up, over,    until the   the force  along the  along the
+///  down to the  skin is     is raised  path, the  probe's axis
+///  standoff     felt        to the     force is   to the standoff
+///               │           set one    held
+///               │           │          │
+///               └───────────┴──────────┴──▶ Lift, with the reason: no skin, the force does not settle, contact lost
+/// ```
+///
+/// A pause slows the motion of any stage down to rest, in contact with the force held; a resume is slow at first.
+/// A stop is the loop's: it brakes; then [`LiftOff`](crate::LiftOff) takes the probe off the skin.
+#[derive(Clone, Debug)]
+pub struct Replay {
+    plan: Plan,
+    settings: ReplaySettings,
+    operator: Operator,
+    stage: Stage,
+    legs: Vec<Leg>,
+    clock: PathClock,
+    law: ContactLaw,
+    touch: Touch,
+    last: Joints,
+    begun: bool,
+    board: Board,
+    dt: f64,
+}
+
+impl Replay {
+    /// The replay of `plan`, listening to `operator`.
+    ///
+    /// # Errors
+    /// When a setting cannot be.
+    pub fn new(plan: Plan, settings: ReplaySettings, operator: Operator) -> Result<Self, ReplayError> {
+        settings.check()?;
+        let (standoff, offset) = (plan.settings.standoff, plan.settings.offset);
+        // The law's offset counts from the standoff, where it begins at rest.
+        let law =
+            plan.slowed(ContactSettings { lowest_m: -0.002, highest_m: standoff + offset, ..settings.law });
+        let law = ContactLaw::new(law, plan.arm.period)?;
+        let (legs, clock) = (plan.legs.clone(), PathClock::new(plan.timing.clone()));
+        let (last, dt) = (plan.start, plan.arm.period.seconds());
+        let (stage, touch) = (Stage::Approach { leg: 0 }, Touch::new(settings.lost_after, dt));
+        let board = Board::default();
+        Ok(Self { plan, settings, operator, stage, legs, clock, law, touch, last, begun: false, board, dt })
+    }
+
+    /// Where it is now.
+    pub fn status(&self) -> ReplayStatus {
+        self.board.read()
+    }
+
+    /// A handle that says where it is, while the loop holds the replay itself.
+    pub fn watch(&self) -> ReplayWatch {
+        self.board.watch()
+    }
+
+    fn pressing(&self, state: &State) -> f64 {
+        -state.wrench.force.z - self.touch.zero()
+    }
+
+    /// Through the air; at the end the descent begins at once.
+    fn approach(&mut self, state: &State, leg: usize, pause: bool) -> Option<Joints> {
+        match self.legs.get_mut(leg).map(|leg| (leg.step(pause, self.dt), *leg.target())) {
+            Some((Some(joints), _)) => Some(joints),
+            Some((None, target)) => {
+                self.last = target;
+                self.stage = Stage::Approach { leg: leg + 1 };
+                self.approach(state, leg + 1, pause)
+            }
+            None => {
+                self.stage = Stage::Descend;
+                self.descend(state, pause)
+            }
+        }
+    }
+
+    /// Down to the skin, slowly where it may be; on the way through the air the force's zero is taken.
+    fn descend(&mut self, state: &State, pause: bool) -> Option<Joints> {
+        let offset = self.law.offset_m();
+        let air = offset < self.plan.settings.standoff - self.settings.skin_within;
+        if air {
+            self.touch.weigh(-state.wrench.force.z, self.settings.touch_n);
+        }
+        let speed = match (pause, air) {
+            (true, _) => 0.0,
+            (_, true) => self.settings.air_speed,
+            (_, false) => self.settings.touch_speed,
+        };
+        self.law.step_at(speed, self.pressing(state));
+        let force = self.law.force_n();
+        if self.touch.is_heavy() {
+            self.stage = Stage::Lift { ending: ReplayEnding::ForceInAir { force_n: self.touch.zero() } };
+        } else if self.touch.is_felt(force, self.settings.touch_n) {
+            self.stage = Stage::Settle { set_n: force, ticks: 0, steady: 0 };
+        } else if offset > self.plan.settings.standoff + self.plan.settings.offset - 1e-3 {
+            self.stage = Stage::Lift { ending: ReplayEnding::NoSkin };
+        }
+        self.on_path()
+    }
+
+    /// The force is raised until it holds.
+    fn settle(&mut self, state: &State, set_n: f64, ticks: u32, steady: u32, pause: bool) -> Option<Joints> {
+        let pressing = self.pressing(state);
+        let rise = if pause { 0.0 } else { self.settings.ramp_n_s * self.dt };
+        let set_n = (set_n + rise).min(self.settings.force_n);
+        self.law.step(pressing, set_n);
+        let missing = (self.settings.force_n - self.law.force_n()).abs();
+        let steady = if missing < 0.1 * self.settings.force_n { steady + 1 } else { 0 };
+        let seconds = |ticks: u32| f64::from(ticks) * self.dt;
+        self.stage = if self.touch.is_lost(self.law.force_n(), self.settings.lost_below_n) {
+            Stage::Lift { ending: ReplayEnding::ContactLost { at_m: 0.0 } }
+        } else if seconds(steady) > 0.3 {
+            Stage::Follow { cap: f64::INFINITY, yielding: false }
+        } else if seconds(ticks) > self.settings.settle_within {
+            Stage::Lift { ending: ReplayEnding::NotSettled { force_n: self.law.force_n() } }
+        } else {
+            Stage::Settle { set_n, ticks: if pause { ticks } else { ticks + 1 }, steady }
+        };
+        self.on_path()
+    }
+
+    /// Along the path, the force held.
+    fn follow(&mut self, state: &State, cap: f64, yielding: bool, pause: bool) -> Option<Joints> {
+        self.law.step(self.pressing(state), self.settings.force_n);
+        let force = self.law.force_n();
+        let soft = self.settings.soft_limit_n;
+        let yielding = force > soft || (yielding && force > 0.5 * (soft + self.settings.force_n));
+        let waits = pause || yielding;
+        let cap = if waits { self.settings.resume_speed } else { self.risen(cap) };
+        let speed = if waits { 0.0 } else { self.plan.settings.speed.speed.min(cap) };
+        let s = self.clock.step(speed, self.dt);
+        self.stage = if self.touch.is_lost(force, self.settings.lost_below_n) {
+            Stage::Lift { ending: ReplayEnding::ContactLost { at_m: s } }
+        } else if self.clock.has_arrived() {
+            Stage::Lift { ending: ReplayEnding::Completed }
+        } else {
+            Stage::Follow { cap, yielding }
+        };
+        self.on_path()
+    }
+
+    /// After a pause the speed stays at the resume speed until it is reached, then rises by as much each second.
+    fn risen(&self, cap: f64) -> f64 {
+        let slow = self.settings.resume_speed;
+        let reached = self.clock.speed() >= 0.95 * slow.min(self.plan.settings.speed.speed);
+        if reached { cap + slow * self.dt } else { cap }
+    }
+
+    /// Up along the probe's axis to the standoff; what still moves along the path comes to rest.
+    fn lift(&mut self, state: &State, ending: ReplayEnding, pause: bool) -> Option<Joints> {
+        self.clock.step(0.0, self.dt);
+        let up = self.law.offset_m() <= 0.5e-3;
+        let rests = self.law.speed_m_s().abs() < 1e-6 && self.clock.is_at_rest();
+        if up && rests {
+            self.finish(ending);
+            return None;
+        }
+        let speed = if up || pause { 0.0 } else { -self.settings.air_speed };
+        self.law.step_at(speed, self.pressing(state));
+        self.on_path()
+    }
+
+    fn finish(&mut self, ending: ReplayEnding) {
+        self.stage = Stage::Done;
+        self.board.end(ending);
+    }
+
+    /// The joints for the place along the path and the offset.
+    fn on_path(&mut self) -> Option<Joints> {
+        let offset = self.law.offset_m() - self.plan.settings.standoff;
+        let pose = along_z(&self.plan.curve.at(self.clock.at()).base_from_probe, offset);
+        let found = self.plan.arm.joints(&pose, &self.last);
+        if found.is_none() {
+            self.finish(ReplayEnding::OutOfReach { at_m: self.clock.at() });
+        }
+        found
+    }
+
+    fn tick(&mut self, state: &State) -> Option<Joints> {
+        let pause = self.operator.wish() != Asked::Go;
+        match self.stage {
+            Stage::Approach { leg } => self.approach(state, leg, pause),
+            Stage::Descend => self.descend(state, pause),
+            Stage::Settle { set_n, ticks, steady } => self.settle(state, set_n, ticks, steady, pause),
+            Stage::Follow { cap, yielding } => self.follow(state, cap, yielding, pause),
+            Stage::Lift { ending } => self.lift(state, ending, pause),
+            Stage::Done => None,
+        }
+    }
+
+    fn report(&self) {
+        let (phase, set_n) = match self.stage {
+            Stage::Approach { .. } => (ReplayPhase::Approach, 0.0),
+            Stage::Descend => (ReplayPhase::Descend, 0.0),
+            Stage::Settle { set_n, .. } => (ReplayPhase::Settle, set_n),
+            Stage::Follow { .. } => (ReplayPhase::Follow, self.settings.force_n),
+            Stage::Lift { .. } => (ReplayPhase::Lift, 0.0),
+            Stage::Done => (ReplayPhase::Done, 0.0),
+        };
+        let offset = self.law.offset_m() - self.plan.settings.standoff;
+        self.board.write(phase, [self.clock.at(), self.clock.speed(), offset, self.law.force_n(), set_n]);
+    }
+}
+
+impl Controller for Replay {
+    fn step(&mut self, state: &State) -> Option<Command> {
+        if !self.begun {
+            self.begun = true;
+            let away = state.commanded.zip(&self.plan.start, |a, b| a - b).largest();
+            // A plan from elsewhere would begin with a jump. NaN compares as nothing.
+            if state.commanded.len() != self.plan.start.len() || away.is_nan() || away > 1e-6 {
+                self.finish(ReplayEnding::StartMoved { away });
+            }
+        }
+        let joints = self.tick(state);
+        self.report();
+        self.last = joints?;
+        joints.map(Command::Position)
+    }
+}
+
+impl ReplaySettings {
+    fn check(&self) -> Result<(), ReplayError> {
+        let numbers = [
+            ("force_n", self.force_n, 0.1, 30.0, "0.1 to 30 N"),
+            ("soft_limit_n", self.soft_limit_n, self.force_n, 60.0, "above force_n, at most 60 N"),
+            ("air_speed", self.air_speed, 1e-4, 0.1, "0.0001 to 0.1 m/s"),
+            ("touch_speed", self.touch_speed, 1e-4, 0.02, "0.0001 to 0.02 m/s"),
+            ("skin_within", self.skin_within, 0.0, 0.1, "0 to 0.1 m"),
+            ("touch_n", self.touch_n, 0.05, self.force_n, "0.05 N to force_n"),
+            ("ramp_n_s", self.ramp_n_s, 0.1, 100.0, "0.1 to 100 N/s"),
+            ("lost_below_n", self.lost_below_n, 0.0, self.touch_n, "0 N to touch_n"),
+            ("lost_after", self.lost_after, 0.002, 1.0, "0.002 to 1 s"),
+            ("settle_within", self.settle_within, 0.5, 60.0, "0.5 to 60 s"),
+            ("resume_speed", self.resume_speed, 1e-4, 0.02, "0.0001 to 0.02 m/s"),
+        ];
+        let bad = numbers.into_iter().find(|(_, value, least, most, _)| !(value >= least && value <= most));
+        bad.map_or(Ok(()), |(name, value, _, _, why)| Err(ReplayError::Setting { name, value, why }))
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod plant;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,207 @@
+//! A replay on the small plant, judged by what was truly commanded and truly felt.
+
+use probepath_robot::{Ending, Finished, Guard, GuardLimits, Tick, Wish, run};
+
+use super::plant::{DT, Plant, Skin, Truth, arm, home, path};
+use super::*;
+use crate::PlanSettings;
+
+const SOFT: Skin = Skin { stiffness: 300.0, bump: 0.0005, wave: 0.03, until: 1.0 };
+
+struct Outcome {
+    finished: Finished,
+    status: ReplayStatus,
+    truth: Vec<Truth>,
+    /// Phase and distance along the path after every tick.
+    seen: Vec<ReplayStatus>,
+    corrected: f64,
+}
+
+/// Runs the default plan on a skin; the operator is told what to do at every tick.
+fn replay(skin: Skin, seed: u64, operate: impl Fn(&ReplayStatus, usize, &Operator)) -> Outcome {
+    let plan = Plan::new(&path(), &arm(), &home(), &PlanSettings::default()).unwrap();
+    replay_plan(plan, skin, seed, operate)
+}
+
+fn replay_plan(
+    plan: Plan,
+    skin: Skin,
+    seed: u64,
+    operate: impl Fn(&ReplayStatus, usize, &Operator),
+) -> Outcome {
+    let operator = Operator::new();
+    let mut replay = Replay::new(plan, ReplaySettings::default(), operator.clone()).unwrap();
+    let watch = replay.watch();
+    let mut plant = Plant::new(skin, home(), seed);
+    let mut guard = Guard::new(GuardLimits::default(), arm().limits).unwrap().listening_to(operator.clone());
+    let (mut seen, mut corrected) = (Vec::new(), 0.0_f64);
+    let mut observer = |tick: &Tick| {
+        let status = watch.status();
+        operate(&status, seen.len(), &operator);
+        seen.push(status);
+        corrected = corrected.max(tick.changed);
+        Wish::GoOn
+    };
+    let finished = run(&mut plant, &mut replay, &mut guard, &mut observer).unwrap();
+    let status = replay.status();
+    Outcome { finished, status, truth: plant.truth, seen, corrected }
+}
+
+/// Largest commanded velocity, acceleration and jerk, as fractions of the joints' limits.
+fn read_back(truth: &[Truth]) -> [f64; 3] {
+    let limits = arm().limits;
+    let mut rows: Vec<Joints> = truth.iter().map(|t| t.commanded).collect();
+    [limits.velocity, limits.acceleration, limits.jerk].map(|limit| {
+        rows = rows.windows(2).map(|p| p[1].zip(&p[0], |b, a| (b - a) / DT)).collect();
+        rows.iter().fold(0.0_f64, |most, row| most.max(row.zip(&limit, |x, l| x / l).largest()))
+    })
+}
+
+fn following(outcome: &Outcome) -> impl Iterator<Item = (&Truth, &ReplayStatus)> {
+    let after = outcome.truth.len() - outcome.seen.len();
+    outcome.truth[after..].iter().zip(&outcome.seen).filter(|(_, s)| s.phase == ReplayPhase::Follow)
+}
+
+/// RMS of the true force's error while following, and the largest true force.
+fn force(outcome: &Outcome) -> (f64, f64) {
+    let errors: Vec<f64> = following(outcome).map(|(t, _)| t.force_n - 5.0).collect();
+    let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+    (rms, outcome.truth.iter().fold(0.0, |most, t| most.max(t.force_n)))
+}
+
+/// Largest and RMS distance across the probe's axis of the commanded pose from the smooth path, and largest angle.
+fn off_path(outcome: &Outcome) -> (f64, f64) {
+    let (arm, path) = (arm(), path());
+    let (mut squares, mut turned, mut n) = (0.0, 0.0_f64, 0.0);
+    for (truth, status) in following(outcome).step_by(20) {
+        let commanded = arm.probe(&truth.commanded);
+        let near = (-10..=10).map(|i| path.curve().at(status.at_m + 2e-5 * f64::from(i)).base_from_probe);
+        let off = near.map(|on| {
+            let way = on.isometry().inverse() * commanded.isometry();
+            (way.translation.vector.xy().norm(), way.rotation.angle())
+        });
+        let (across, angle) = off.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
+        (squares, turned, n) = (squares + across * across, turned.max(angle), n + 1.0);
+    }
+    ((squares / f64::max(n, 1.0)).sqrt(), turned)
+}
+
+#[test]
+fn a_replay_holds_the_force_and_keeps_the_path_and_every_limit() {
+    for (seed, stiffness) in [300.0, 700.0, 1500.0, 3000.0].into_iter().enumerate() {
+        let skin = Skin { stiffness, ..SOFT };
+        let outcome = replay(skin, seed as u64, |_, _, _| {});
+        assert_eq!(outcome.status.ending, Some(ReplayEnding::Completed), "{stiffness}: {:?}", outcome.status);
+        let (rms, most) = force(&outcome);
+        eprintln!(
+            "stiffness {stiffness} N/m: force {rms:.3} N RMS, most {most:.2} N; {:?}",
+            off_path(&outcome)
+        );
+        assert!(rms <= 0.3, "{stiffness} N/m: {rms} N RMS");
+        assert!(most <= 6.0, "{stiffness} N/m: {most} N");
+        let (across, turned) = off_path(&outcome);
+        assert!(across <= 0.05e-3 && turned < 1e-3, "{across} m, {turned} rad");
+        let [v, a, j] = read_back(&outcome.truth);
+        eprintln!("  {v:.3} {a:.3} {j:.3} of the limits, corrected by {:e}", outcome.corrected);
+        assert!(v.max(a).max(j) <= 1.0, "{v} {a} {j}");
+        assert!(outcome.corrected < 1e-9, "the limits had to correct {}", outcome.corrected);
+    }
+}
+
+#[test]
+fn a_pause_waits_on_the_skin_with_the_force_held_and_a_resume_is_slow() {
+    let outcome = replay(SOFT, 7, |status, tick, operator| {
+        match (status.phase, tick % 2500) {
+            // In every phase: a second of pause every five.
+            (_, 1500) => operator.pause(),
+            (_, 2000) => operator.resume(),
+            _ => {}
+        }
+    });
+    assert_eq!(outcome.status.ending, Some(ReplayEnding::Completed));
+    assert!(force(&outcome).0 <= 0.3);
+    let waiting = following(&outcome).filter(|(_, s)| s.speed_m_s == 0.0).count();
+    assert!(waiting > 500, "{waiting}");
+    assert!(following(&outcome).all(|(_, s)| s.speed_m_s <= 0.01 + 1e-9));
+    assert!(outcome.seen.windows(2).all(|p| p[1].at_m >= p[0].at_m), "it went back");
+    assert!(read_back(&outcome.truth).iter().all(|part| *part <= 1.0));
+}
+
+#[test]
+fn the_same_seed_gives_the_same_commands() {
+    let commands = || replay(SOFT, 3, |_, _, _| {}).truth.iter().map(|t| t.commanded).collect::<Vec<_>>();
+    assert!(commands() == commands());
+}
+
+#[test]
+fn where_the_skin_ends_contact_is_lost_and_the_probe_lifted() {
+    let outcome = replay(Skin { until: 0.12, ..SOFT }, 5, |_, _, _| {});
+    let Some(ReplayEnding::ContactLost { at_m }) = outcome.status.ending else {
+        panic!("{:?}", outcome.status)
+    };
+    assert!((0.06..0.08).contains(&at_m), "{at_m}");
+    assert!(matches!(outcome.finished.ending, Ending::Done));
+    // Lifted to the standoff, not left hanging where the skin was.
+    assert!((outcome.status.offset_m + 0.04).abs() < 0.002, "{:?}", outcome.status);
+    assert!(read_back(&outcome.truth).iter().all(|part| *part <= 1.0));
+}
+
+#[test]
+fn without_skin_the_descent_ends_at_its_bound_and_the_probe_is_lifted() {
+    let outcome = replay(Skin { until: -1.0, ..SOFT }, 5, |_, _, _| {});
+    assert_eq!(outcome.status.ending, Some(ReplayEnding::NoSkin));
+    assert!(outcome.seen.iter().all(|s| s.offset_m < 0.0151));
+}
+
+#[test]
+fn a_stop_in_any_phase_brakes_within_the_limits() {
+    for at in [200, 1500, 2500, 3200, 4000, 6000] {
+        let outcome = replay(SOFT, 1, |_, tick, operator| {
+            if tick == at {
+                operator.stop();
+            }
+        });
+        assert_eq!(outcome.finished.ending, Ending::Operator, "{at}");
+        assert!(read_back(&outcome.truth).iter().all(|part| *part <= 1.0 + 1e-9), "{at}");
+        assert!(force(&outcome).1 < 6.5, "{at}");
+    }
+}
+
+#[test]
+fn a_plan_from_elsewhere_never_moves_the_arm() {
+    let plan = Plan::new(&path(), &arm(), &home(), &PlanSettings::default()).unwrap();
+    let mut replay = Replay::new(plan, ReplaySettings::default(), Operator::new()).unwrap();
+    let mut start = home();
+    start[2] += 0.01;
+    let mut plant = Plant::new(SOFT, start, 0);
+    let mut guard = Guard::new(GuardLimits::default(), arm().limits).unwrap();
+    run(&mut plant, &mut replay, &mut guard, &mut ()).unwrap();
+    assert!(
+        matches!(replay.status().ending, Some(ReplayEnding::StartMoved { away }) if (away - 0.01).abs() < 1e-9)
+    );
+    assert!(plant.truth.iter().all(|t| t.commanded == start));
+}
+
+#[test]
+fn a_force_in_the_air_is_a_reason_not_to_touch() {
+    let plan = Plan::new(&path(), &arm(), &home(), &PlanSettings::default()).unwrap();
+    let mut replay = Replay::new(plan, ReplaySettings::default(), Operator::new()).unwrap();
+    let mut plant = Plant::new(SOFT, home(), 0);
+    plant.drift_n = 3.0;
+    let mut guard = Guard::new(GuardLimits::default(), arm().limits).unwrap();
+    run(&mut plant, &mut replay, &mut guard, &mut ()).unwrap();
+    assert!(matches!(replay.status().ending, Some(ReplayEnding::ForceInAir { .. })), "{:?}", replay.status());
+}
+
+#[test]
+fn settings_that_cannot_be_are_refused_by_name() {
+    let plan = Plan::new(&path(), &arm(), &home(), &PlanSettings::default()).unwrap();
+    for settings in [
+        ReplaySettings { force_n: f64::NAN, ..ReplaySettings::default() },
+        ReplaySettings { force_n: 12.0, ..ReplaySettings::default() },
+        ReplaySettings { touch_speed: 0.5, ..ReplaySettings::default() },
+    ] {
+        let refused = Replay::new(plan.clone(), settings, Operator::new());
+        assert!(matches!(refused, Err(ReplayError::Setting { .. })));
+    }
+}
