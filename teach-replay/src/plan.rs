@@ -3,9 +3,10 @@
 mod approach;
 mod refusal;
 
+use probepath_frames::{Base, Point, Pose, Probe};
 use probepath_robot::motion::follow::{Curve, PoseCurve};
 use probepath_robot::motion::timing::{PathLimits, PathSpeed};
-use probepath_robot::{ContactSettings, InverseOptions, Joints, Workspace};
+use probepath_robot::{ContactSettings, InverseOptions, Joints, Plane, Workspace};
 
 use crate::probe_arm::along_z;
 use crate::{Path, ProbeArm};
@@ -209,6 +210,12 @@ fn refuse_crawling(report: &PlanReport, settings: &PlanSettings) -> Result<(), P
     Ok(())
 }
 
+/// The first plane of the workspace that a point lies beyond, and by how much (m).
+fn outside(workspace: &Workspace, point: &Point<Base>) -> Option<(usize, f64)> {
+    let beyond = |plane: &Plane| (plane.through.vector() - point.vector()).dot(&plane.inward.vector());
+    workspace.planes().iter().map(beyond).enumerate().find(|(_, beyond)| *beyond > 0.0)
+}
+
 /// The way along the path, posture after posture.
 struct Tour<'a> {
     arm: &'a ProbeArm,
@@ -266,7 +273,7 @@ impl Tour<'_> {
         let Some(joints) = self.arm.joints(&pose, near) else {
             return Err(PlanError::new(place, self.why_not(&pose, near)));
         };
-        if let Some((plane, beyond)) = self.settings.workspace.crossed(&pose.origin()) {
+        if let Some((plane, beyond)) = outside(&self.settings.workspace, &pose.origin()) {
             return Err(PlanError::new(place, Refusal::Workspace { plane, beyond_mm: beyond * 1e3 }));
         }
         self.margin(place, s, &joints)?;
@@ -298,11 +305,7 @@ impl Tour<'_> {
     }
 
     /// Tracking failed: is there any posture at all?
-    fn why_not(
-        &self,
-        pose: &probepath_frames::Pose<probepath_frames::Base, probepath_frames::Probe>,
-        near: &Joints,
-    ) -> Refusal {
+    fn why_not(&self, pose: &Pose<Base, Probe>, near: &Joints) -> Refusal {
         match self.arm.model.inverse(pose, &self.arm.flange_from_probe, near, &InverseOptions::default()) {
             Err(why) => Refusal::Unreachable(why),
             Ok(other) => Refusal::OtherPosture { away: near.zip(&other, |a, b| a - b).largest() },

@@ -218,6 +218,30 @@ fn least_of(limit: &Joints, slope: &Joints) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
+/// One speed that follows a wanted one as quickly as its bounds on acceleration and jerk allow, in closed form.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpeedRamp {
+    rate: Rate,
+    bounds: Bounds,
+}
+
+impl SpeedRamp {
+    /// At rest. Bounds (1/s^2 and 1/s^3 of the way's unit) that are not above zero let nothing move.
+    pub fn at_rest(acceleration: f64, jerk: f64) -> Self {
+        let positive = |bound: f64| if bound > 0.0 { bound } else { f64::MIN_POSITIVE };
+        let bounds = Bounds { acceleration: positive(acceleration), jerk: positive(jerk) };
+        Self { rate: Rate::default(), bounds }
+    }
+
+    /// Toward `wanted` for one tick of `dt` seconds; the mean speed of the tick. A wish that is not finite is rest.
+    pub fn step(&mut self, wanted: f64, dt: f64) -> f64 {
+        let target = if wanted.is_finite() { wanted } else { 0.0 };
+        let (way, rate) = ramp::after(&self.rate, target, &self.bounds, dt);
+        self.rate = rate;
+        way / dt
+    }
+}
+
 /// Where along the path the motion is; moved on by one tick at a time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PathClock {

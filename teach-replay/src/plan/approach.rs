@@ -79,7 +79,7 @@ fn look(
     let (mut before, mut fastest) = (None, 1e-6_f64);
     for i in 0..=looks {
         let here = arm.probe(&motion.at(i as f64 * LOOK_S)).origin();
-        if let Some((plane, beyond)) = settings.workspace.crossed(&here) {
+        if let Some((plane, beyond)) = settings.workspace.crossed(&here, &before.unwrap_or(here)) {
             return Err(PlanError::new(place, Refusal::Workspace { plane, beyond_mm: beyond * 1e3 }));
         }
         fastest = before.map_or(fastest, |before| fastest.max(here.distance(&before) / LOOK_S));

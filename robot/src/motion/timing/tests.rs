@@ -184,3 +184,18 @@ fn a_wish_that_is_no_number_is_a_pause() {
     }
     assert!(clock.is_at_rest() && !clock.has_arrived() && clock.at() > 0.005);
 }
+
+#[test]
+fn a_speed_follows_a_wish_that_jumps_within_its_bounds_and_a_wish_that_is_no_number_is_rest() {
+    let mut ramp = SpeedRamp::at_rest(0.8, 8.0);
+    let wish = |tick: usize| if (tick / 130) % 2 == 0 { 0.1 } else { -0.1 };
+    let speeds: Vec<f64> = (0..2000).map(|tick| ramp.step(wish(tick), DT)).collect();
+    let rates: Vec<f64> = speeds.windows(2).map(|p| (p[1] - p[0]) / DT).collect();
+    assert!(speeds.iter().all(|v| v.abs() <= 0.1 + 1e-12) && speeds.iter().any(|v| *v < -0.099));
+    assert!(rates.iter().all(|a| a.abs() <= 0.8 + 1e-9));
+    assert!(rates.windows(2).all(|p| (p[1] - p[0]).abs() / DT <= 8.0 + 1e-6));
+    for _ in 0..500 {
+        ramp.step(f64::NAN, DT);
+    }
+    assert!(ramp.step(f64::NAN, DT) == 0.0);
+}
