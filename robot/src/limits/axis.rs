@@ -34,8 +34,8 @@ pub(crate) struct Rest {
     pub(crate) highest: f64,
 }
 
-/// How often the search for the nearest safe acceleration halves: to 1e-6 of the acceleration limit.
-const HALVINGS: usize = 20;
+/// How often the search for the nearest safe acceleration halves: to 1/4096 of the acceleration limit.
+const HALVINGS: usize = 12;
 
 /// The longest brake that is looked ahead: two minutes at 1 kHz, far more than an arm takes.
 pub(crate) const LONGEST_BRAKE: usize = 120_000;
