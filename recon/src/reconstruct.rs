@@ -198,3 +198,6 @@ fn warnings(seen: &[(f64, bool)], counts: &ImageCounts, settings: &LumenSettings
     }
     warnings
 }
+
+#[cfg(test)]
+mod tests;

@@ -11,6 +11,10 @@ use crate::patch::Patch;
 /// Directions in which a border is described.
 pub(crate) const RAYS: usize = 72;
 
+/// A seed that is not this much darker than its surroundings is in no lumen (dB): half of what speckle's holes reach
+/// after smoothing.
+const LEAST_CONTRAST_DB: f64 = 6.0;
+
 /// What the front filled.
 #[derive(Clone, Debug)]
 pub(crate) struct Region {
@@ -32,11 +36,13 @@ struct Statistics {
 pub(crate) fn grow(patch: &Patch, seed: (f64, f64)) -> Result<Region, NoLumen> {
     let outside = NoLumen::OutsidePicture { x_mm: seed.0 * 1e3, y_mm: seed.1 * 1e3 };
     let db: Vec<f64> =
-        patch.smoothed((0.30e-3, 0.20e-3)).iter().map(|p| 10.0 * p.max(1e-9).log10()).collect();
-    let start = darkest_near(patch, &db, seed, 0.8e-3).ok_or(outside)?;
+        patch.smoothed((0.20e-3, 0.20e-3)).iter().map(|p| 10.0 * p.max(1e-9).log10()).collect();
+    // Wide enough that a speckle's hole is not taken for the lumen.
+    let wide = patch.smoothed((0.5e-3, 0.4e-3));
+    let start = darkest_near(patch, &wide, seed, 1.0e-3).ok_or(outside)?;
     let mut statistics = Statistics { lumen: lumen_round(patch, &db, start), tissue: tissue(&db) };
     let contrast_db = statistics.tissue.0 - statistics.lumen.0;
-    if contrast_db < 9.0 {
+    if contrast_db < LEAST_CONTRAST_DB {
         return Err(NoLumen::NoContrast { contrast_db });
     }
     let first = fill(patch, &db, start, &statistics);
@@ -46,9 +52,9 @@ pub(crate) fn grow(patch: &Patch, seed: (f64, f64)) -> Result<Region, NoLumen> {
 }
 
 /// The darkest cell within `reach` of a place.
-fn darkest_near(patch: &Patch, db: &[f64], place: (f64, f64), reach: f64) -> Option<usize> {
+fn darkest_near(patch: &Patch, power: &[f64], place: (f64, f64), reach: f64) -> Option<usize> {
     patch.cell_at(place)?;
-    within(patch, place, reach).min_by(|&a, &b| db[a].total_cmp(&db[b]))
+    within(patch, place, reach).min_by(|&a, &b| power[a].total_cmp(&power[b]))
 }
 
 fn within(patch: &Patch, place: (f64, f64), reach: f64) -> impl Iterator<Item = usize> {

@@ -49,22 +49,36 @@ fn region(
     if mean_db < DARK_DB {
         return Err(NoLumen::Dark { mean_db });
     }
-    let predicted = given.or_else(|| predicted(image, trail));
-    let lost = given.is_none() && far_from_trail(image, trail, predicted);
-    let place = match predicted {
-        Some(place) if !lost => place,
-        Some(place) => seed::find(&image.bscan, table, settings, Some((place, 8e-3)))?,
-        None => seed::find(&image.bscan, table, settings, None)?,
+    if let Some(place) = given {
+        return grown(image, table, settings, place);
+    }
+    let look = |near| seed::find(&image.bscan, table, settings, near);
+    let Some(place) = predicted(image, trail) else {
+        return grown(image, table, settings, look(None)?);
     };
+    let lost = far_from_trail(image, trail, place);
+    let first = if lost { Err(NoLumen::Unsettled) } else { grown(image, table, settings, place) };
+    let farthest = if lost { 8e-3 } else { 3e-3 };
+    first.or_else(|why| {
+        // Not where it was expected: the roundest dark thing near there.
+        let found = look(Some((place, farthest))).map_err(|nothing| if lost { nothing } else { why })?;
+        grown(image, table, settings, found)
+    })
+}
+
+/// The region round a seed.
+fn grown(
+    image: &PlacedBScan,
+    table: &PowerOfGrey,
+    settings: &LumenSettings,
+    place: (f64, f64),
+) -> Result<Region, NoLumen> {
     let half = WINDOW * settings.radius_range_m.1;
     let outside = NoLumen::OutsidePicture { x_mm: place.0 * 1e3, y_mm: place.1 * 1e3 };
     let patch = Patch::around(&image.bscan, table, place, (half, half), (0.16e-3, 0.16e-3)).ok_or(outside)?;
     let region = grow(&patch, place)?;
     let by = (region.centre.0 - place.0).hypot(region.centre.1 - place.1);
-    if by > 0.6 * settings.radius_range_m.1 && given.is_none() {
-        return Err(NoLumen::Jump { by_mm: by * 1e3 });
-    }
-    Ok(region)
+    if by > 0.6 * settings.radius_range_m.1 { Err(NoLumen::Jump { by_mm: by * 1e3 }) } else { Ok(region) }
 }
 
 /// Mean power of the brighter half of the picture (dB), from one pixel in 49.
@@ -96,12 +110,7 @@ fn predicted(image: &PlacedBScan, trail: &[Vector3<f64>]) -> Option<(f64, f64)> 
 }
 
 /// Whether the last place with a lumen is too far from the plane to say where it is.
-fn far_from_trail(image: &PlacedBScan, trail: &[Vector3<f64>], predicted: Option<(f64, f64)>) -> bool {
-    match (trail.last(), predicted) {
-        (Some(last), Some((x, y))) => {
-            let here = image.world_from_image * Point::new(x, y, 0.0);
-            (here.vector() - last).norm() > LOST_M
-        }
-        _ => false,
-    }
+fn far_from_trail(image: &PlacedBScan, trail: &[Vector3<f64>], (x, y): (f64, f64)) -> bool {
+    let here = image.world_from_image * Point::new(x, y, 0.0);
+    trail.last().is_some_and(|last| (here.vector() - last).norm() > LOST_M)
 }

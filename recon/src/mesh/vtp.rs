@@ -26,7 +26,7 @@ pub(super) fn bytes(mesh: &Mesh) -> Vec<u8> {
             out,
             "<PointData Scalars=\"{name}\">\n<DataArray type=\"Float64\" Name=\"{name}\" format=\"ascii\">"
         );
-        (0..points).for_each(|i| drop(write!(out, "{} ", values.get(i).copied().unwrap_or_default())));
+        (0..points).for_each(|i| { let _ = write!(out, "{} ", values.get(i).copied().unwrap_or_default()); });
         out.push_str("</DataArray>\n</PointData>\n");
     }
     out.push_str("<Points>\n<DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">");
@@ -36,7 +36,7 @@ pub(super) fn bytes(mesh: &Mesh) -> Vec<u8> {
     );
     mesh.triangles.iter().for_each(|[a, b, c]| drop(writeln!(out, "{a} {b} {c}")));
     out.push_str("</DataArray>\n<DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">");
-    (1..=polygons).for_each(|i| drop(write!(out, "{} ", 3 * i)));
+    (1..=polygons).for_each(|i| { let _ = write!(out, "{} ", 3 * i); });
     out.push_str("</DataArray>\n</Polys>\n</Piece>\n</PolyData>\n</VTKFile>\n");
     out.into_bytes()
 }
