@@ -47,15 +47,17 @@ impl Default for HandConfig {
     }
 }
 
-/// The hand's spring (N/m, N m/rad) and damper (N s/m, N m s/rad), and its strength (N, N m).
-const SPRING_N_M: f64 = 400.0;
+/// The hand's spring along the probe's axes (N/m), about them (N m/rad), its dampers (N s/m, N m s/rad) and its
+/// strength (N, N m). A stiffer hand, on software that bounds acceleration and jerk, swings up as a pilot does on a
+/// slow aircraft: 400 N/m across did, at 1.5 Hz, on 60 N s/m with at most 0.8 m/s² and 8 m/s³.
+const SPRING_N_M: [f64; 3] = [130.0, 130.0, 350.0];
 const DAMPER_N_S_M: f64 = 12.0;
-const TURN_SPRING_N_M: f64 = 8.0;
+const TURN_SPRING_N_M: f64 = 4.0;
 const TURN_DAMPER_N_M_S: f64 = 0.15;
 const STRONGEST_N: f64 = 12.0;
 const STRONGEST_N_M: f64 = 2.0;
 /// Height over the skin from which it comes down, and to which it rises at the end (m).
-const HOVER_M: f64 = 0.040;
+const HOVER_M: f64 = 0.025;
 /// Its speed through the air (m/s), and down to the skin (m/s).
 const AIR_M_S: f64 = 0.060;
 const DOWN_M_S: f64 = 0.015;
@@ -63,7 +65,7 @@ const DOWN_M_S: f64 = 0.015;
 /// waits.
 const SLOWS_AT_M: f64 = 0.010;
 /// How fast it presses deeper for each newton that it misses (m/(N s)), and at most (m).
-const PRESS_M_N_S: f64 = 0.004;
+const PRESS_M_N_S: f64 = 0.003;
 const DEEPEST_M: f64 = 0.045;
 /// It has felt the skin from this force on (N).
 const TOUCH_N: f64 = 0.7;
@@ -108,26 +110,31 @@ pub(crate) struct Hand {
 /// A person's unsteadiness: slow wandering and tremor (3 to 8 Hz) of place and orientation.
 #[derive(Clone, Debug)]
 struct Habits {
-    wander: [Wander; 5],
-    tremor: [Wander; 5],
+    wander: [Wander; 4],
+    tremor: [Wander; 6],
     press: Wander,
 }
 
 impl Habits {
     fn new(seed: u64) -> Self {
         let mut stream = Stream::new(seed, "hand");
-        let mut of = |low, high| std::array::from_fn(|_| Wander::new(&mut stream, low, high));
-        let (wander, tremor) = (of(0.1, 0.4), of(3.0, 8.0));
+        let wander = std::array::from_fn(|_| Wander::new(&mut stream, 0.1, 0.4));
+        let tremor = std::array::from_fn(|_| Wander::new(&mut stream, 3.0, 8.0));
         let press = Wander::new(&mut stream, 0.08, 0.25);
         Self { wander, tremor, press }
     }
 
-    /// The hand's error at `t` seconds: place (m) across, along and in depth; turn (rad) about x, y, z of the probe.
+    /// How far it is from where it means to be at `t` seconds: place (m); turn (rad) about x, y, z of the probe.
     fn at(&self, t: f64) -> (Vector3<f64>, Vector3<f64>) {
-        let mix = |i: usize, slow: f64, fast: f64| slow * self.wander[i].at(t) + fast * self.tremor[i].at(t);
-        let place = Vector3::new(mix(0, 1.2e-3, 0.15e-3), mix(1, 0.0, 0.15e-3), 0.0);
-        let turn = Vector3::new(mix(2, 0.035, 0.004), mix(3, 0.035, 0.004), mix(4, 0.035, 0.004));
-        (place, turn)
+        let place = Vector3::new(1.2e-3 * self.wander[0].at(t), 0.0, 0.0);
+        (place, Vector3::from_fn(|i, _| 0.035 * self.wander[1 + i].at(t)))
+    }
+
+    /// The tremor at `t` seconds: force (N) and torque (N m).
+    fn tremble(&self, t: f64) -> (Vector3<f64>, Vector3<f64>) {
+        let [force, torque] = [&self.tremor[..3], &self.tremor[3..]];
+        let all = |wanders: &[Wander], size: f64| Vector3::from_fn(|i, _| size * wanders[i].at(t));
+        (all(force, 0.15), all(torque, 0.01))
     }
 }
 
@@ -182,7 +189,7 @@ impl Hand {
         let pace = self.pace(&target, probe);
         self.clock_s += seconds;
         self.advance(skin_n, pace, seconds);
-        let wrench = self.pull(&target, probe, twist, seconds);
+        let wrench = self.pull(&target, (probe, twist), seconds);
         Grip { wrench, guiding: self.guides() }
     }
 
@@ -278,9 +285,8 @@ impl Hand {
             self.depth_m = (self.depth_m - 0.05 * seconds).max(-0.012);
             return;
         }
-        let wanted = self.config.press_n
-            * (1.0 + 0.12 * self.config.unsteadiness * self.habits.press.at(self.clock_s));
-        let step = PRESS_M_N_S * (wanted - skin_n).clamp(-6.0, 6.0);
+        let unsteady = 0.12 * self.config.unsteadiness * self.habits.press.at(self.clock_s);
+        let step = PRESS_M_N_S * (self.config.press_n * (1.0 + unsteady) - skin_n).clamp(-6.0, 6.0);
         self.depth_m = (self.depth_m + step * seconds).clamp(-HOVER_M, DEEPEST_M);
     }
 
@@ -288,8 +294,7 @@ impl Hand {
     fn pull(
         &mut self,
         target: &Pose<World, Probe>,
-        probe: &Pose<World, Probe>,
-        twist: &Twist<Probe>,
+        (probe, twist): (&Pose<World, Probe>, &Twist<Probe>),
         seconds: f64,
     ) -> Wrench<Probe> {
         let went = self
@@ -299,8 +304,12 @@ impl Hand {
         self.moving += (went - self.moving) * (seconds / 0.03);
         let error = (probe.inverse() * *target).isometry().to_owned();
         let moving = (probe.inverse().isometry().rotation) * self.moving;
-        let force = error.translation.vector * SPRING_N_M + (moving - twist.linear) * DAMPER_N_S_M;
-        let torque = error.rotation.scaled_axis() * TURN_SPRING_N_M - twist.angular * TURN_DAMPER_N_M_S;
+        let (mut force, mut torque) = self.habits.tremble(self.clock_s);
+        force = force * self.config.unsteadiness
+            + error.translation.vector.component_mul(&Vector3::from(SPRING_N_M));
+        torque = torque * self.config.unsteadiness + error.rotation.scaled_axis() * TURN_SPRING_N_M;
+        force += (moving - twist.linear) * DAMPER_N_S_M;
+        torque -= twist.angular * TURN_DAMPER_N_M_S;
         Wrench::new(force.cap_magnitude(STRONGEST_N), torque.cap_magnitude(STRONGEST_N_M))
     }
 }

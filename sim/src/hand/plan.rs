@@ -60,7 +60,7 @@ fn stroke(to_m: f64, speed_m_s: f64, mishap: Option<Mishap>, stream: &mut Stream
         Some(Mishap::Hurry) => [Some(Stroke::Go { to_m, speed_m_s: 2.2 * speed_m_s }), None],
         Some(Mishap::Rest) => [go, Some(Stroke::Pause { seconds: stream.uniform(0.5, 1.5) })],
         Some(Mishap::TurnBack) => {
-            let back = (to_m - stream.uniform(0.006, 0.014)).max(0.0);
+            let back = (to_m - stream.uniform(0.014, 0.024)).max(0.0);
             [go, Some(Stroke::Go { to_m: back, speed_m_s })]
         }
         Some(Mishap::LiftOff) => [go, Some(Stroke::Lift { seconds: stream.uniform(1.2, 1.8) })],
