@@ -12,6 +12,8 @@ use crate::ProbeArm;
 pub(super) const SHARE: f64 = 0.95;
 /// Damping of the least squares at a singularity (m, rad).
 const DAMPING: f64 = 0.05;
+/// Ticks between two looks at the distance to a singularity.
+const LOOK_TICKS: u8 = 7;
 /// How far ahead it is looked whether a singularity comes nearer (s).
 const AHEAD_S: f64 = 0.05;
 
@@ -95,6 +97,8 @@ pub(super) struct Motion {
     /// lead the probe astray.
     speeds: [SpeedRamp; 6],
     moving: [f64; 6],
+    /// Distance to the nearest singularity, and ticks until it is looked at again.
+    nearness: (f64, u8),
     dt: f64,
 }
 
@@ -107,7 +111,14 @@ impl Motion {
         let (linear, angular) =
             (SpeedRamp::at_rest(LINEAR.0, LINEAR.1), SpeedRamp::at_rest(ANGULAR.0, ANGULAR.1));
         let speeds = [linear, linear, linear, angular, angular, angular];
-        Self { linear: Vector3::zeros(), angular: Vector3::zeros(), speeds, moving: [0.0; 6], dt }
+        Self {
+            linear: Vector3::zeros(),
+            angular: Vector3::zeros(),
+            speeds,
+            moving: [0.0; 6],
+            nearness: (0.0, 0),
+            dt,
+        }
     }
 
     /// One tick of `mass * acceleration = force - damping * velocity`, solved for the tick's end, so that it is
@@ -133,8 +144,17 @@ impl Motion {
         }
     }
 
+    /// Distance to the nearest singularity: a singular value is dear, and changes little in [`LOOK_TICKS`].
+    fn nearness(&mut self, arm: &ProbeArm, here: &Joints) -> f64 {
+        self.nearness = match self.nearness {
+            (_, 0) => (arm.distance_to_singularity(here), LOOK_TICKS),
+            (known, ticks) => (known, ticks - 1),
+        };
+        self.nearness.0
+    }
+
     /// The joint velocities that move the probe so from `here`, or a part of them.
-    pub(super) fn joint_velocity(&self, arm: &ProbeArm, settings: &GiveWay, here: &Joints) -> Joints {
+    pub(super) fn joint_velocity(&mut self, arm: &ProbeArm, settings: &GiveWay, here: &Joints) -> Joints {
         let rotation = arm.probe(here).isometry().rotation;
         let moving = &self.moving;
         // Each direction keeps its bound by itself; together they keep it here.
@@ -143,7 +163,7 @@ impl Motion {
         let (linear, angular) = (rotation * linear, rotation * angular);
         let twist = Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z);
         let jacobian = arm.model.jacobian(here, &arm.flange_from_probe);
-        let nearness = arm.distance_to_singularity(here);
+        let nearness = self.nearness(arm, here);
         let damping = DAMPING * (1.0 - nearness / settings.slow_below).clamp(0.0, 1.0);
         let matrix = jacobian.matrix();
         let square = matrix * matrix.transpose() + Matrix6::identity() * (damping * damping + 1e-12);
