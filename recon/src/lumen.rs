@@ -66,15 +66,14 @@ pub fn segment(images: &[PlacedBScan], settings: &LumenSettings) -> Vec<ImageLum
     let mut borders: Vec<Result<Border, NoLumen>> = images.par_iter().zip(&regions).map(fit).collect();
     for _ in 0..PASSES {
         let planes = beam::planes(images, &borders, &settings.point_spread);
-        let again = |((image, region), (border, planes)): (
-            (&PlacedBScan, &Result<Region, NoLumen>),
-            (_, &Vec<Plane>),
-        )| {
-            let border: &Result<Border, NoLumen> = border;
-            let (Ok(region), Ok(earlier)) = (region, border) else { return border.clone() };
-            look.fitted(image, region, planes, Some(earlier))
-        };
-        borders = images.par_iter().zip(&regions).zip(borders.par_iter().zip(&planes)).map(again).collect();
+        let inputs = images.par_iter().zip(&regions).zip(&planes);
+        borders = inputs
+            .zip(borders.par_iter())
+            .map(|(((image, region), planes), border)| {
+                let (Ok(region), Ok(earlier)) = (region, border) else { return border.clone() };
+                look.fitted(image, region, planes, Some(earlier))
+            })
+            .collect();
     }
     let each = images.iter().zip(regions.iter().zip(borders));
     each.map(|(image, (region, border))| {

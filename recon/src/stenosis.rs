@@ -6,6 +6,8 @@ use crate::Section;
 
 /// A narrowing is bounded where the area is back at this part of the largest nearby.
 const SHOULDER: f64 = 0.93;
+/// Over this length the area is looked ahead for (mm).
+const STRETCH_MM: f64 = 6.0;
 /// How far a narrowing may reach on either side of its narrowest place (mm).
 const REACH_MM: f64 = 30.0;
 /// Length of the normal segment that is the reference (mm), and the least of it that must be measured.
@@ -147,7 +149,15 @@ fn shoulder(outward: &[Place], least: Place) -> Place {
     });
     let own = &outward[..until.unwrap_or(outward.len())];
     let largest = own.iter().map(|place| place.area).fold(least.area, f64::max);
-    own.iter().copied().find(|place| place.area >= SHOULDER * largest).unwrap_or(least)
+    // Half of what was lost is back, and the next stretch brings hardly more: beyond a branch the vessel may be of
+    // another size altogether, and that is no part of this narrowing.
+    let half = least.area + 0.5 * (largest - least.area);
+    let ended = own.iter().find(|place| {
+        let beyond = own.iter().filter(|next| (next.at - least.at).abs() >= (place.at - least.at).abs());
+        let near = beyond.filter(|next| (next.at - place.at).abs() <= STRETCH_MM);
+        place.area >= half && place.area >= SHOULDER * near.map(|next| next.area).fold(0.0, f64::max)
+    });
+    ended.copied().unwrap_or(least)
 }
 
 /// The median area between two places, when enough of it was measured.

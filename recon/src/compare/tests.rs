@@ -15,7 +15,7 @@ fn tube(rows: usize, around: usize, wider: f64) -> Mesh {
         Vector3::new(x, bend + r * angle.cos(), 1.2 * r * angle.sin())
     };
     let points = (0..rows).flat_map(|row| (0..around).map(move |k| (row, k))).map(|(r, k)| point(r, k));
-    let points: Vec<_> = points.map(|p| probepath_frames::Point::from_vector(p)).collect();
+    let points: Vec<_> = points.map(probepath_frames::Point::from_vector).collect();
     let surface = crate::LumenSurface {
         along: rows,
         around,
@@ -75,13 +75,13 @@ fn the_closest_point_of_a_triangle_is_nearer_than_any_sampled_one() {
 
 #[test]
 fn a_surface_moved_away_is_laid_back_on_itself() {
-    let gold = tube(120, 40, 0.0);
+    let gold = tube(80, 30, 0.0);
     let mut dice = Dice(7);
-    for case in 0..12 {
-        let size = if case < 6 { 0.2 } else { 3.0 };
+    for case in 0..6 {
+        let size = if case < 3 { 0.2 } else { 3.0 };
         let turn = UnitQuaternion::from_scaled_axis(vector(&mut dice) * size);
         let moved = Isometry3::from_parts((vector(&mut dice) * 0.5).into(), turn);
-        let mut surface = tube(150, 36, 0.0);
+        let mut surface = tube(90, 28, 0.0);
         surface.points.iter_mut().for_each(|p| *p = moved.transform_point(&(*p).into()).coords);
         let found = compare(&surface, &gold, Fit::Rigid).expect("surfaces");
         assert!(found.error.mean_mm < 0.02 && found.hausdorff_mm < 0.12, "{case}: {:?}", found.error);

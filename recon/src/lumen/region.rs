@@ -36,19 +36,46 @@ struct Statistics {
 pub(crate) fn grow(patch: &Patch, seed: (f64, f64)) -> Result<Region, NoLumen> {
     let outside = NoLumen::OutsidePicture { x_mm: seed.0 * 1e3, y_mm: seed.1 * 1e3 };
     let db: Vec<f64> =
-        patch.smoothed((0.20e-3, 0.20e-3)).iter().map(|p| 10.0 * p.max(1e-9).log10()).collect();
+        patch.smoothed((0.30e-3, 0.20e-3)).iter().map(|p| 10.0 * p.max(1e-9).log10()).collect();
     // Wide enough that a speckle's hole is not taken for the lumen.
     let wide = patch.smoothed((0.5e-3, 0.4e-3));
     let start = darkest_near(patch, &wide, seed, 1.0e-3).ok_or(outside)?;
-    let mut statistics = Statistics { lumen: lumen_round(patch, &db, start), tissue: tissue(&db) };
-    let contrast_db = statistics.tissue.0 - statistics.lumen.0;
+    let (lumen, tissue) = (lumen_round(patch, &db, start), tissue(&db));
+    let contrast_db = tissue.0 - lumen.0;
     if contrast_db < LEAST_CONTRAST_DB {
         return Err(NoLumen::NoContrast { contrast_db });
     }
-    let first = fill(patch, &db, start, &statistics);
-    statistics.lumen = moments(first.iter().map(|&cell| db[cell]));
-    let cells = fill(patch, &db, start, &statistics);
-    describe(patch, &cells)
+    // A front that finds no border has run out through a dark speckle in the wall: the wall is taken to be darker.
+    let mut found = Err(NoLumen::Unsettled);
+    for darker in [0.0, 0.2, 0.35] {
+        let tissue = (tissue.0 - darker * contrast_db, tissue.1);
+        found = grow_with(patch, &db, start, Statistics { lumen, tissue });
+        if !matches!(found, Err(NoLumen::NoBorder { .. })) {
+            break;
+        }
+    }
+    found
+}
+
+fn grow_with(patch: &Patch, db: &[f64], start: usize, mut statistics: Statistics) -> Result<Region, NoLumen> {
+    statistics.sharpen();
+    let first = fill(patch, db, start, &statistics);
+    // Learned again from what was filled, unless that has run out of the lumen.
+    if describe(patch, &first).is_ok() {
+        statistics.lumen = moments(first.iter().map(|&cell| db[cell]));
+        statistics.sharpen();
+    }
+    describe(patch, &fill(patch, db, start, &statistics))
+}
+
+impl Statistics {
+    /// Where the two overlap widely, the front would run through speckle: neither is wider than a third of what
+    /// lies between them.
+    fn sharpen(&mut self) {
+        let widest = ((self.tissue.0 - self.lumen.0) / 3.0).max(1.0);
+        self.lumen.1 = self.lumen.1.min(widest);
+        self.tissue.1 = self.tissue.1.min(widest);
+    }
 }
 
 /// The darkest cell within `reach` of a place.

@@ -61,7 +61,9 @@ fn region(
     let farthest = if lost { 8e-3 } else { 3e-3 };
     first.or_else(|why| {
         // Not where it was expected: the roundest dark thing near there.
-        let found = look(Some((place, farthest))).map_err(|nothing| if lost { nothing } else { why })?;
+        let near = look(Some((place, farthest))).map_err(|nothing| if lost { nothing } else { why });
+        // What was followed last may have been nothing at all: a vessel long lost may be anywhere.
+        let found = if lost { near.or_else(|_| look(None)) } else { near }?;
         grown(image, table, settings, found)
     })
 }
@@ -103,7 +105,9 @@ fn predicted(image: &PlacedBScan, trail: &[Vector3<f64>]) -> Option<(f64, f64)> 
         // A vessel nearly in the plane says little about where it goes through.
         Some(along) if along.z.abs() > 0.4 => {
             let steps = (-here.z / along.z).clamp(-LOST_M, LOST_M);
-            Some((here.x + along.x * steps, here.y + along.y * steps))
+            // Arteries and sweeps are within some 25 degrees of each other; more is a trail that went astray.
+            let aside = |by: f64| (by * steps).clamp(-0.5 * steps.abs(), 0.5 * steps.abs());
+            Some((here.x + aside(along.x), here.y + aside(along.y)))
         }
         _ => Some((here.x, here.y)),
     }

@@ -10,10 +10,10 @@ use super::{Mesh, SPACE};
 
 pub(super) fn bytes(mesh: &Mesh) -> Vec<u8> {
     let mut out = format!("ply\nformat ascii 1.0\ncomment {SPACE}\ncomment probepath lumen, mm\n");
-    let _ = write!(out, "element vertex {}\n", mesh.points.len());
+    let _ = writeln!(out, "element vertex {}", mesh.points.len());
     out.push_str("property double x\nproperty double y\nproperty double z\n");
     if let Some((name, _)) = &mesh.values {
-        let _ = write!(out, "property double {}\n", name.replace(char::is_whitespace, "_"));
+        let _ = writeln!(out, "property double {}", name.replace(char::is_whitespace, "_"));
     }
     let _ = write!(
         out,

@@ -26,17 +26,25 @@ pub(super) fn bytes(mesh: &Mesh) -> Vec<u8> {
             out,
             "<PointData Scalars=\"{name}\">\n<DataArray type=\"Float64\" Name=\"{name}\" format=\"ascii\">"
         );
-        (0..points).for_each(|i| { let _ = write!(out, "{} ", values.get(i).copied().unwrap_or_default()); });
+        (0..points).for_each(|i| {
+            let _ = write!(out, "{} ", values.get(i).copied().unwrap_or_default());
+        });
         out.push_str("</DataArray>\n</PointData>\n");
     }
     out.push_str("<Points>\n<DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">");
-    mesh.points.iter().map(|p| p * 1e3).for_each(|p| drop(write!(out, "{} {} {}\n", p.x, p.y, p.z)));
+    mesh.points.iter().map(|p| p * 1e3).for_each(|p| {
+        let _ = writeln!(out, "{} {} {}", p.x, p.y, p.z);
+    });
     out.push_str(
         "</DataArray>\n</Points>\n<Polys>\n<DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">",
     );
-    mesh.triangles.iter().for_each(|[a, b, c]| drop(writeln!(out, "{a} {b} {c}")));
+    mesh.triangles.iter().for_each(|[a, b, c]| {
+        let _ = writeln!(out, "{a} {b} {c}");
+    });
     out.push_str("</DataArray>\n<DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">");
-    (1..=polygons).for_each(|i| { let _ = write!(out, "{} ", 3 * i); });
+    (1..=polygons).for_each(|i| {
+        let _ = write!(out, "{} ", 3 * i);
+    });
     out.push_str("</DataArray>\n</Polys>\n</Piece>\n</PolyData>\n</VTKFile>\n");
     out.into_bytes()
 }
