@@ -15,6 +15,7 @@ mod settings;
 mod spline;
 mod stenosis;
 mod surface;
+pub mod volume;
 
 #[cfg(test)]
 mod phantom_images;

@@ -21,11 +21,24 @@ impl Sequence {
         let axes = axes::of(header, !fields.is_empty(), &mut notes)?;
         pixel_type(header, &axes)?;
         let orientation = orientation(header, &axes, options, &mut notes)?;
-        let pictures = pictures(payload, packing(header)?, &axes, orientation, options)?;
+        let pictures = pictures(payload, header.packing()?, &axes, orientation, options)?;
         let images = join(pictures, fields, &axes, &mut notes)?;
         let (width, height) = if axes.has_pictures() { (axes.width, axes.height) } else { (0, 0) };
         fields::look_over(&images, axes.has_pictures(), &mut notes);
         Ok(Self { width, height, images, fields: rest, notes })
+    }
+}
+
+impl Header {
+    /// How the payload is packed.
+    ///
+    /// # Errors
+    /// When it is packed in a way that is not supported.
+    pub fn packing(&self) -> Result<Packing, SequenceError> {
+        match self.format {
+            Format::MetaImage => metaimage_packing(self),
+            Format::Nrrd => nrrd_packing(self),
+        }
     }
 }
 
@@ -84,13 +97,6 @@ fn orientation(
         notes.push(Note::Turned { from: orientation });
     }
     Ok(orientation)
-}
-
-pub(super) fn packing(header: &Header) -> Result<Packing, SequenceError> {
-    match header.format {
-        Format::MetaImage => metaimage_packing(header),
-        Format::Nrrd => nrrd_packing(header),
-    }
 }
 
 fn metaimage_packing(header: &Header) -> Result<Packing, SequenceError> {

@@ -68,8 +68,7 @@ impl Header {
         self.get(key).map(|v| v.split_whitespace().collect()).unwrap_or_default()
     }
 
-    /// The first `count` lines' worth of file names are refused elsewhere; this says whether the payload is elsewhere,
-    /// and in which file beside the header.
+    /// The file beside the header that holds the payload; `None` when it follows the header.
     ///
     /// # Errors
     /// When the header names a list or pattern of files, or one outside its own folder.

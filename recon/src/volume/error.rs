@@ -1,0 +1,65 @@
+//! Why a volume cannot be built.
+
+use thiserror::Error;
+
+/// What is wrong with the images or settings of a volume.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum VolumeError {
+    /// Nothing to build from.
+    #[error("no image has a place: nothing to build a volume from")]
+    NoImages,
+    /// The region leaves no pixel.
+    #[error("the clip region leaves no pixel of image {image} ({width} x {height})")]
+    NothingLeft {
+        /// Which slice.
+        image: usize,
+        /// Its columns.
+        width: usize,
+        /// Its rows.
+        height: usize,
+    },
+    /// A voxel size or origin that is none.
+    #[error("a grid of {size:?} voxels of {spacing_mm:?} mm is none: sizes are positive and finite")]
+    BadGrid {
+        /// Voxels along x, y, z.
+        size: [usize; 3],
+        /// Their size (mm).
+        spacing_mm: [f64; 3],
+    },
+    /// More memory than allowed.
+    #[error(
+        "{size:?} voxels need {needs_mb} MB, the limit is {limit_mb} MB: \
+         take larger voxels or a smaller region, or raise the limit"
+    )]
+    TooLarge {
+        /// Voxels along x, y, z.
+        size: [u64; 3],
+        /// Megabytes needed.
+        needs_mb: u64,
+        /// Megabytes allowed.
+        limit_mb: u64,
+    },
+    /// Pixels that do not fill their slice, or a place that is not finite.
+    #[error("image {image} has {bytes} bytes at {width} columns, or a place that is not finite")]
+    BadSlice {
+        /// Which slice.
+        image: usize,
+        /// Its bytes.
+        bytes: usize,
+        /// Its columns.
+        width: usize,
+    },
+    /// Too far away to count in voxels.
+    #[error("image {image} lies more than 2^29 voxels from the grid: its pose or the voxel size is wrong")]
+    OffGrid {
+        /// Which slice.
+        image: usize,
+    },
+    /// Sums would overflow.
+    #[error("a voxel could take {hits:.1e} pixels, more than can be summed exactly: take smaller voxels")]
+    TooDense {
+        /// Pixels a voxel could take.
+        hits: f64,
+    },
+}
