@@ -60,15 +60,18 @@ impl Grid {
             return Err(VolumeError::NoImages);
         }
         let spacing = Vector3::from(settings.spacing_m);
-        // A hair above whole numbers, so that a corner on a voxel's centre does not lose its voxel to rounding.
-        let steps = (high - low).component_div(&spacing).map(|s| (s + 1e-9).floor());
+        let steps = (high - low).component_div(&spacing).map(f64::round);
         let size = [steps.x, steps.y, steps.z].map(|s| s as usize).map(|s| s.saturating_add(1));
         Ok(Self { origin: Point::from_vector(low), spacing_m: settings.spacing_m, size })
     }
 }
 
 /// The corners of the region's rectangle, its far edges counted as one more column and row.
-fn corners(image: usize, slice: &Slice<'_>, settings: &VolumeSettings) -> Result<[Vector3<f64>; 4], VolumeError> {
+fn corners(
+    image: usize,
+    slice: &Slice<'_>,
+    settings: &VolumeSettings,
+) -> Result<[Vector3<f64>; 4], VolumeError> {
     let (width, height) = (slice.width, slice.height());
     let rectangle = Region { fan: None, ..settings.region };
     let clip = Clip::of(&rectangle, width, height);
