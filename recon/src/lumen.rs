@@ -58,12 +58,13 @@ pub struct ImageLumen {
 pub fn segment(images: &[PlacedBScan], settings: &LumenSettings) -> Vec<ImageLumen> {
     let table = PowerOfGrey::new(settings.dynamic_range_db);
     let look = Look { table: &table, settings };
-    let regions = track::follow(images, &table, settings);
+    let mut regions = track::follow(images, &table, settings);
     let fit = |(image, region): (&PlacedBScan, &Result<Region, NoLumen>)| {
         let region = region.as_ref().map_err(|why| *why)?;
         look.fitted(image, region, &Plane::ITSELF, None)
     };
     let mut borders: Vec<Result<Border, NoLumen>> = images.par_iter().zip(&regions).map(fit).collect();
+    second_look(images, &look, &mut regions, &mut borders);
     for _ in 0..PASSES {
         let planes = beam::planes(images, &borders, &settings.point_spread);
         let inputs = images.par_iter().zip(&regions).zip(&planes);
@@ -85,6 +86,32 @@ pub fn segment(images: &[PlacedBScan], settings: &LumenSettings) -> Vec<ImageLum
         ImageLumen { number: image.bscan.number, lumen }
     })
     .collect()
+}
+
+/// Looks again at images that were refused between images that were not, where those have the lumen. What is found
+/// there has to show its wall as any other.
+fn second_look(
+    images: &[PlacedBScan],
+    look: &Look<'_>,
+    regions: &mut [Result<Region, NoLumen>],
+    borders: &mut [Result<Border, NoLumen>],
+) {
+    for ((image, border), region) in images.iter().zip(borders.iter_mut()).zip(regions.iter()) {
+        if let (Ok(fitted), Ok(grown)) = (&*border, &*region)
+            && let Err(why) = look.accepted(image, fitted, grown)
+        {
+            *border = Err(why);
+        }
+    }
+    let between = track::between(images, borders, &look.settings.point_spread);
+    for (((image, border), region), disc) in images.iter().zip(borders).zip(regions).zip(between) {
+        let dark = matches!(region, Err(NoLumen::Dark { .. }));
+        let Some(disc) = disc.filter(|_| border.is_err() && !dark) else { continue };
+        let Ok(fitted) = look.fitted(image, &disc, &Plane::ITSELF, None) else { continue };
+        if look.accepted(image, &fitted, &disc).is_ok() {
+            (*border, *region) = (Ok(fitted), Ok(disc));
+        }
+    }
 }
 
 /// How often the wall is fitted again with what the neighbouring images say about the beam's thickness.
