@@ -1,6 +1,27 @@
-//! From B-scans that know where they were: the lumen of an artery, its surface, its measures.
+//! From B-scans that know where they were: the lumen of an artery, its surface, its measures; and volumes.
 //!
-//! It never hears of robots.
+//! ```no_run
+//! use probepath_recon::{Fit, LumenSettings, Mesh, compare, reconstruct_lumen};
+//! use probepath_us_capture::PlacedBScan;
+//!
+//! fn measure(sweep: &[PlacedBScan]) -> Result<(), Box<dyn std::error::Error>> {
+//!     let found = reconstruct_lumen(sweep, &LumenSettings::default())?;
+//!     for stenosis in &found.stenoses {
+//!         println!("{:.0} % of the area at {:.0} mm", stenosis.percent_area, stenosis.at_mm);
+//!     }
+//!     let mesh = found.surface.mesh();
+//!     mesh.write("lumen.stl".as_ref())?;
+//!     let beside = compare(&mesh, &Mesh::read("gold.stl".as_ref())?, Fit::Rigid)?;
+//!     println!("{:.2} mm from the gold standard", beside.error.mean_mm);
+//!     Ok(())
+//! }
+//! ```
+//!
+//! The nouns: a [`Contour`] is the lumen's border in one image, or [`NoLumen`] says why there is none; a
+//! [`LumenSurface`] is what all of them make; a [`Section`] is normal to its [`Centreline`]; a [`Stenosis`] is measured
+//! against a named [`Reference`].
+//!
+//! What it does not do: hear of robots, or invent a lumen where none is seen.
 
 mod centreline;
 mod compare;

@@ -97,7 +97,7 @@ fn second_look(
     borders: &mut [Result<Border, NoLumen>],
 ) {
     for ((image, border), region) in images.iter().zip(borders.iter_mut()).zip(regions.iter()) {
-        if let (Ok(fitted), Ok(grown)) = (&*border, &*region)
+        if let (Ok(fitted), Ok(grown)) = (border.as_ref(), region)
             && let Err(why) = look.accepted(image, fitted, grown)
         {
             *border = Err(why);
