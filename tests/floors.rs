@@ -60,5 +60,8 @@ fn an_edge_that_goes_up_is_named() {
     let scripts = members.iter().find(|p| p.name.as_str() == "probepath-scripts").expect("scripts");
     let pretended: BTreeMap<&str, &[&str]> = [("probepath-scripts", &["probepath-frames"] as &[&str])].into();
     let wrong = wrong_edges(scripts, &pretended);
-    assert!(wrong.iter().any(|w| w == "probepath-scripts leans on probepath-sim, which is not below it"), "{wrong:?}");
+    assert!(
+        wrong.iter().any(|w| w == "probepath-scripts leans on probepath-sim, which is not below it"),
+        "{wrong:?}"
+    );
 }

@@ -7,6 +7,7 @@ mod vtp;
 use std::path::Path;
 
 use nalgebra::Vector3;
+use probepath_frames::{Point, World};
 use thiserror::Error;
 
 use crate::LumenSurface;
@@ -145,18 +146,27 @@ fn kind(path: &Path) -> Result<(&'static str, Reader), MeshError> {
 impl LumenSurface {
     /// The surface as a closed mesh: the grid, and a cap at either end.
     pub fn mesh(&self) -> Mesh {
-        let mut mesh = Mesh { points: self.points.iter().map(|p| p.vector()).collect(), ..Mesh::default() };
-        let around = self.around as u32;
+        Mesh::tube(&self.points, (self.along, self.around))
+    }
+}
+
+impl Mesh {
+    /// A closed tube of `along` rings of `around` points each, ring after ring: its points are the grid's, then the
+    /// middles of the caps at either end.
+    pub fn tube(points: &[Point<World>], (along, around): (usize, usize)) -> Self {
+        let mut mesh = Self { points: points.iter().map(Point::vector).collect(), ..Self::default() };
+        let rings = around;
+        let around = around as u32;
         let at = |row: u32, k: u32| row * around + k % around;
-        for row in 1..self.along as u32 {
+        for row in 1..along as u32 {
             for k in 0..around {
                 mesh.triangles.push([at(row - 1, k), at(row - 1, k + 1), at(row, k)]);
                 mesh.triangles.push([at(row - 1, k + 1), at(row, k + 1), at(row, k)]);
             }
         }
-        let last = self.along.saturating_sub(1);
+        let last = along.saturating_sub(1);
         for (row, first) in [(0, true), (last, false)] {
-            let ring = self.points.iter().skip(row * self.around).take(self.around);
+            let ring = points.iter().skip(row * rings).take(rings);
             let centre = ring.map(|p| p.vector()).sum::<Vector3<f64>>() / f64::from(around);
             let hub = mesh.points.len() as u32;
             mesh.points.push(centre);

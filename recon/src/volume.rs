@@ -10,7 +10,8 @@
 //! let at = |z| PixelMap::<World>::new(Point::new(0.0, 0.0, z), Vector3::x() * 5e-4, Vector3::y() * 5e-4);
 //! let slices = [0.0, 5e-4].map(at).into_iter().zip(&pixels).map(|(map, pixels)| Slice::new(pixels, 4, map));
 //! let volume = Volume::build(&slices.collect::<Vec<_>>(), &VolumeSettings::every_mm(0.5))?;
-//! assert_eq!(volume.grid().size, [4, 3, 2]);
+//! // The far edges count as one more column and row, as in PLUS.
+//! assert_eq!(volume.grid().size, [5, 4, 2]);
 //! assert_eq!(volume.at([3, 2, 1]), Some(30));
 //! # Ok::<(), probepath_recon::volume::VolumeError>(())
 //! ```

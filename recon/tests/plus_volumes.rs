@@ -1,5 +1,7 @@
 //! Volumes of the real spine phantom, against those that PLUS built from the same images and settings.
 
+#![allow(clippy::expect_used, reason = "a test may stop at the first surprise")]
+
 use std::path::PathBuf;
 
 use nalgebra::Vector3;

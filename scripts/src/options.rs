@@ -1,7 +1,7 @@
 //! Reading the option maps of a protocol: every key is known, every value is of its kind, or the error says which
 //! and shows how it is written.
 
-use rhai::{Dynamic, FLOAT, INT, Map};
+use rhai::{Array, Dynamic, FLOAT, INT, Map};
 
 use crate::quantity::Quantity;
 
@@ -51,32 +51,14 @@ impl Options {
             .map_err(|found| format!("{}: `{key}` is a text; found {}", self.step, describe(found, &shown)))
     }
 
-    /// A whole number within `range`, when the key is there.
+    /// A list, when the key is there.
     ///
     /// # Errors
-    /// When the value is no whole number or lies outside.
-    pub fn count(&mut self, key: &'static str, range: std::ops::RangeInclusive<INT>) -> Result<Option<usize>, String> {
+    /// When the value is no list.
+    pub fn list(&mut self, key: &'static str) -> Result<Option<Array>, String> {
         let Some(value) = self.take(key) else { return Ok(None) };
         let shown = value.to_string();
-        match value.as_int() {
-            Ok(n) if range.contains(&n) => Ok(Some(n as usize)),
-            _ => Err(format!(
-                "{}: `{key}` is a whole number from {} to {}; found {shown}",
-                self.step,
-                range.start(),
-                range.end()
-            )),
-        }
-    }
-
-    /// True or false, when the key is there.
-    ///
-    /// # Errors
-    /// When the value is neither.
-    pub fn flag(&mut self, key: &'static str) -> Result<Option<bool>, String> {
-        let Some(value) = self.take(key) else { return Ok(None) };
-        let shown = value.to_string();
-        value.as_bool().map(Some).map_err(|_| format!("{}: `{key}` is true or false; found {shown}", self.step))
+        value.into_array().map(Some).map_err(|_| format!("{}: `{key}` is a list; found {shown}", self.step))
     }
 
     /// Refuses what was not asked for, and says what could have been.

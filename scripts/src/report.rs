@@ -3,11 +3,15 @@
 //! What it shows and why follows `FIELD.md` section 6: always percent area beside percent diameter, the reference by
 //! name, and the sentence that a B-mode lumen is not a Doppler grade.
 
+pub mod bscan_picture;
+pub mod build;
 pub mod curve;
 pub mod html;
 pub mod picture;
 pub mod surface_picture;
+mod text;
 
+use probepath_us_capture::Calibration;
 use serde::{Deserialize, Serialize};
 
 /// Everything a report says, in the units in its names. Serialised as `report.json` and by `scan --json`.
@@ -75,6 +79,21 @@ pub struct Heading {
     pub calibration_rms_mm: Option<f64>,
 }
 
+impl Heading {
+    /// What a calibration says of the machine's setting and of itself.
+    pub fn of_calibration(calibration: &Calibration) -> Self {
+        let setting = &calibration.setting;
+        Self {
+            depth_mm: setting.depth_m * 1e3,
+            focus_mm: setting.focus_m * 1e3,
+            window_mm: setting.window_height_m * 1e3,
+            calibration: calibration.id.clone(),
+            calibration_rms_mm: Some(calibration.error.rms_mm),
+            ..Self::default()
+        }
+    }
+}
+
 /// Distance of grid points to the true surface after a rigid fit ([P1] eq. 6), mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SurfaceError {
@@ -93,6 +112,8 @@ pub struct StenosisRow {
     pub segment: String,
     /// Lost area, percent of the reference.
     pub percent_area: f64,
+    /// Its standard deviation, from speckle and poses (points).
+    pub percent_area_sd: f64,
     /// Lost diameter, percent of the reference.
     pub percent_diameter: f64,
     /// Grade by percent diameter: 1-19 / 20-49 / 50-99 % / occluded.

@@ -180,6 +180,11 @@ impl SimulatedMachine {
 }
 
 impl BScanSource for SimulatedMachine {
+    fn skip(&mut self, now: Stamp) -> Result<(), SourceFault> {
+        self.drop_until(now);
+        Ok(())
+    }
+
     fn poll(&mut self, now: Stamp) -> Result<Option<BScan>, SourceFault> {
         if self.drawn.is_empty() {
             let formed = self.formed(now, AHEAD);

@@ -12,6 +12,16 @@ pub trait BScanSource {
     /// # Errors
     /// When the stream is broken: it ended, or what arrived is no B-scan.
     fn poll(&mut self, now: Stamp) -> Result<Option<BScan>, SourceFault>;
+
+    /// Lets go of the B-scans that have arrived by `now`: nobody wants them. A source that makes its B-scans only when
+    /// they are asked for need not make these.
+    ///
+    /// # Errors
+    /// As [`Self::poll`].
+    fn skip(&mut self, now: Stamp) -> Result<(), SourceFault> {
+        while self.poll(now)?.is_some() {}
+        Ok(())
+    }
 }
 
 /// Why a source has no more B-scans.

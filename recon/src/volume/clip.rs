@@ -111,8 +111,9 @@ mod tests {
             // A pixel clearly inside is used, a pixel clearly outside is not; the margin is under two pixels.
             let slack = 2.0 / radius;
             let inside = angle > -0.6 + slack && angle < 0.5 - slack && radius > 20.0 && radius < 57.0;
-            let outside = angle < -0.6 || angle > 0.5 || radius < 18.0 || radius > 60.0;
-            assert!(!(inside && !used) && !(outside && used), "{x} {y}: {used}");
+            let outside = !(-0.6..=0.5).contains(&angle) || !(18.0..=60.0).contains(&radius);
+            let right = if used { !outside } else { !inside };
+            assert!(right, "{x} {y}: {used}");
         }
     }
 }

@@ -111,12 +111,13 @@ fn stenoses(body: &mut String, rows: &[StenosisRow]) {
     for s in rows {
         let _ = write!(
             body,
-            "<tr><th>{}</th><td>{}</td><td class='n'>{:.1} %</td><td class='n'>{:.1} %</td><td>{}</td>\
+            "<tr><th>{}</th><td>{}</td><td class='n'>{:.1} ± {:.1} %</td><td class='n'>{:.1} %</td><td>{}</td>\
              <td class='n'>{:.1} mm</td><td class='n'>{:.1} mm</td><td class='n'>{:.1} mm², {:.1} mm</td>\
              <td>{:.1} mm², {}</td></tr>",
             escape(&s.name),
             escape(&s.segment),
             s.percent_area,
+            s.percent_area_sd,
             s.percent_diameter,
             escape(&s.grade),
             s.at_mm,

@@ -1,0 +1,13 @@
+//! Work without an arm: reconstruct an exam or a sequence once more, compare surfaces, convert files, ask a model.
+//!
+//! Each answer says itself twice: as text for people (`Display`) and as data for programs (`Serialize`).
+
+mod arm;
+mod compare;
+mod convert;
+mod reconstruct;
+
+pub use arm::{ArmAnswer, ArmError, ArmQuestion, arm};
+pub use compare::{CompareError, Comparison, compare};
+pub use convert::{ConvertError, Converted, convert};
+pub use reconstruct::{Reconstructed, ReconstructError, reconstruct};

@@ -1,0 +1,109 @@
+//! `probepath convert`: between the formats of sequences, volumes and surfaces.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use probepath_recon::volume::{Layer, Volume};
+use probepath_recon::{Mesh, MeshError};
+use probepath_us_capture::sequence::{ReadOptions, Sequence, SequenceError};
+use serde::Serialize;
+use thiserror::Error;
+
+/// What was converted.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Converted {
+    /// What was read.
+    pub input: PathBuf,
+    /// What was written.
+    pub output: PathBuf,
+    /// What it is, in words.
+    pub what: String,
+    /// What was assumed or changed on the way.
+    pub notes: Vec<String>,
+}
+
+/// What cannot be converted.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ConvertError {
+    /// A pair of formats with no way between them.
+    #[error(
+        "no way from {} to {}: sequences are .igs.mha, .igs.mhd, .igs.nrrd; volumes .mha, .nrrd; surfaces .stl, .ply, .vtp",
+        input.display(), output.display()
+    )]
+    NoWay {
+        /// What would be read.
+        input: PathBuf,
+        /// What would be written.
+        output: PathBuf,
+    },
+    /// A sequence or a volume.
+    #[error(transparent)]
+    Sequence(#[from] SequenceError),
+    /// A surface.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+}
+
+/// What an ending says a file is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Sequence,
+    Volume,
+    Surface,
+}
+
+/// Most bytes that are unpacked.
+const MOST_BYTES: u64 = 4 << 30;
+
+/// Converts one file.
+///
+/// # Errors
+/// When there is no way between the two, or one cannot be read or written.
+pub fn convert(input: &Path, output: &Path) -> Result<Converted, ConvertError> {
+    let mut notes = Vec::new();
+    let what = match (kind(input), kind(output)) {
+        (Some(Kind::Sequence), Some(Kind::Sequence)) => {
+            let sequence = Sequence::read(input, &ReadOptions::default())?;
+            notes.extend(sequence.notes().iter().map(ToString::to_string));
+            sequence.write(output)?;
+            format!("{} images of {} x {}", sequence.images().len(), sequence.width(), sequence.height())
+        }
+        (Some(Kind::Volume), Some(Kind::Volume)) => {
+            let volume = Volume::read(input, MOST_BYTES)?;
+            volume.write(output, Layer::Grey)?;
+            let [x, y, z] = volume.grid().size;
+            format!("a volume of {x} x {y} x {z}")
+        }
+        (Some(Kind::Surface), Some(Kind::Surface)) => {
+            let mesh = Mesh::read(input)?;
+            mesh.write(output)?;
+            format!("a surface of {} points and {} triangles", mesh.points.len(), mesh.triangles.len())
+        }
+        _ => return Err(ConvertError::NoWay { input: input.into(), output: output.into() }),
+    };
+    Ok(Converted { input: input.into(), output: output.into(), what, notes })
+}
+
+fn kind(path: &Path) -> Option<Kind> {
+    let name = path.file_name()?.to_string_lossy().to_lowercase();
+    let ends = |endings: &[&str]| endings.iter().any(|ending| name.ends_with(ending));
+    if ends(&[".igs.mha", ".igs.mhd", ".igs.nrrd"]) {
+        Some(Kind::Sequence)
+    } else if ends(&[".mha", ".nrrd"]) {
+        Some(Kind::Volume)
+    } else if ends(&[".stl", ".ply", ".vtp"]) {
+        Some(Kind::Surface)
+    } else {
+        None
+    }
+}
+
+impl fmt::Display for Converted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for note in &self.notes {
+            writeln!(f, "note: {note}")?;
+        }
+        write!(f, "{}: {}, written to {}", self.input.display(), self.what, self.output.display())
+    }
+}

@@ -1,0 +1,109 @@
+//! Why a step of the session failed.
+
+use std::path::PathBuf;
+
+use probepath_recon::ReconError;
+use probepath_robot::RunError;
+use probepath_sim::CellError;
+use probepath_teach_replay::{GuideError, PathError, PlanError, ReplayError};
+use probepath_us_capture::{BadCalibration, CaptureError};
+use probepath_us_capture::exam::ExamError;
+use thiserror::Error;
+
+use crate::report::build::ReportError;
+
+/// Why a step failed. The arm is at rest, and what was recorded is in the exam file.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum SessionError {
+    /// A cell file that is none.
+    #[error("{file}: {why}")]
+    Cell {
+        /// The file.
+        file: String,
+        /// What is wrong, with its line.
+        why: String,
+    },
+    /// The simulated cell cannot be built.
+    #[error("the simulated cell cannot be built: {0}")]
+    Simulated(#[from] CellError),
+    /// A file that cannot be read or written.
+    #[error("cannot {doing} {}: {source}", path.display())]
+    File {
+        /// What was being done.
+        doing: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The exam file.
+    #[error("the exam file: {0}")]
+    Exam(#[from] ExamError),
+    /// A wish outside what this cell allows.
+    #[error("{what} is {value}: {wanted}")]
+    Wish {
+        /// Which.
+        what: &'static str,
+        /// What was asked for, with its unit.
+        value: String,
+        /// What would be allowed.
+        wanted: String,
+    },
+    /// The taught path, or its file.
+    #[error(transparent)]
+    Path(#[from] PathError),
+    /// The path cannot be replayed.
+    #[error("nothing was moved: {0}")]
+    Plan(#[from] PlanError),
+    /// Hand guiding cannot begin.
+    #[error(transparent)]
+    Guide(#[from] GuideError),
+    /// The replay cannot begin.
+    #[error(transparent)]
+    Replay(#[from] ReplayError),
+    /// A calibration that cannot be written or used.
+    #[error(transparent)]
+    Calibration(#[from] BadCalibration),
+    /// A motion was stopped by a fault.
+    #[error("{step}: {source}")]
+    Motion {
+        /// What was being done.
+        step: &'static str,
+        /// Why, with the last ticks.
+        source: Box<RunError>,
+    },
+    /// A motion that its controller ended before it was done.
+    #[error("{step} ended early: {why}")]
+    Ended {
+        /// What was being done.
+        step: &'static str,
+        /// Why.
+        why: String,
+    },
+    /// The operator stopped.
+    #[error("{step} was stopped by the operator; the arm is at rest")]
+    Stopped {
+        /// What was being done.
+        step: &'static str,
+    },
+    /// B-scans that cannot be placed.
+    #[error("B-scans: {0}")]
+    Capture(#[from] CaptureError),
+    /// No lumen.
+    #[error("reconstruction: {0}")]
+    Reconstruction(#[from] ReconError),
+    /// A step before the one it needs.
+    #[error("{0}")]
+    Order(&'static str),
+    /// The report could not be made.
+    #[error("the report: {0}")]
+    Report(#[from] ReportError),
+}
+
+impl SessionError {
+    /// Whether it says only that the operator wanted to stop.
+    pub const fn is_stop(&self) -> bool {
+        matches!(self, Self::Stopped { .. })
+    }
+}

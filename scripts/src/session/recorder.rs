@@ -1,0 +1,202 @@
+//! Who watches a motion: [`Taped`] keeps every exchange with the arm in the exam, [`Recorder`] takes the hand's path,
+//! the B-scans and the figures from every tick.
+
+use std::borrow::Cow;
+
+use probepath_frames::{Base, Flange, Pose, Probe, Span, Stamp, World};
+use probepath_robot::{Arm, ArmFault, Command, Joints, Model, Observer, Operator, State, Tick, Wish};
+use probepath_teach_replay::{Recording, Sample};
+use probepath_us_capture::exam::{ExamWriter, Row, TickRecord};
+use probepath_us_capture::{BScanSource, Capture, CaptureError, PlacedBScan};
+
+use super::figures::Figures;
+use crate::progress::Progress;
+
+/// Where a motion is, as its controller says it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Stand {
+    /// What it is doing: `teach`, `approach`, `touch`, `follow`, `lift`.
+    pub(super) phase: &'static str,
+    /// How far along the path (m), where there is one.
+    pub(super) along_m: Option<f64>,
+    /// How much of the step is done, 0 to 1.
+    pub(super) fraction: f64,
+}
+
+/// What the cell knows about where things are.
+#[derive(Clone)]
+pub(super) struct Facts {
+    pub(super) model: Model,
+    pub(super) world_from_base: Pose<World, Base>,
+    pub(super) flange_from_probe: Pose<Flange, Probe>,
+}
+
+impl Facts {
+    /// Where the model says the probe is.
+    pub(super) fn base_from_probe(&self, joints: &Joints) -> Pose<Base, Probe> {
+        self.model.forward(joints) * self.flange_from_probe
+    }
+}
+
+/// An arm whose every exchange is kept, those before and after a motion too: so that a recorded exam can stand in for
+/// the arm, exchange by exchange.
+pub(super) struct Taped<'a> {
+    pub(super) arm: &'a mut (dyn Arm + Send),
+    pub(super) exam: &'a ExamWriter,
+    pub(super) facts: &'a Facts,
+    pub(super) stand: &'a dyn Fn() -> Stand,
+}
+
+impl Arm for Taped<'_> {
+    fn exchange(&mut self, command: &Command) -> Result<State, ArmFault> {
+        let state = self.arm.exchange(command)?;
+        let base_from_probe = self.facts.base_from_probe(&state.position);
+        self.exam.tick(TickRecord {
+            tick: state.tick,
+            stamp: state.stamp,
+            command: match command {
+                Command::Stay => None,
+                Command::Position(joints) => Some(row(joints)),
+            },
+            position: row(&state.position),
+            velocity: row(&state.velocity),
+            commanded: row(&state.commanded),
+            wrench: state.wrench,
+            guiding: state.guiding,
+            phase: Cow::Borrowed((self.stand)().phase),
+            world_from_probe: Some(self.facts.world_from_base * base_from_probe),
+        });
+        Ok(state)
+    }
+
+    fn period(&self) -> Span {
+        self.arm.period()
+    }
+
+    fn joints(&self) -> usize {
+        self.arm.joints()
+    }
+}
+
+/// As many numbers as joints; both have room for eight.
+fn row(joints: &Joints) -> Row {
+    Row::from_slice(joints.as_slice()).unwrap_or_default()
+}
+
+/// The B-scans of a scan.
+pub(super) struct Eye<'a> {
+    pub(super) machine: &'a mut (dyn BScanSource + Send),
+    pub(super) capture: &'a mut Capture,
+    pub(super) images: &'a mut Vec<PlacedBScan>,
+    /// Paused while the machine is silent.
+    pub(super) operator: &'a Operator,
+    /// Whether it was the silence that paused, and not a person.
+    pub(super) paused: bool,
+    /// The last tick on the path, once there was one.
+    pub(super) followed: Option<Stamp>,
+}
+
+/// No machine is later with a B-scan.
+const LATEST: Span = Span::from_milliseconds(500);
+
+/// A machine that is silent for longer than this ends the scan.
+const LONGEST_SILENCE: Span = Span::from_milliseconds(5000);
+
+/// Everybody who wants to know of a tick, in one place.
+pub(super) struct Recorder<'a> {
+    pub(super) exam: &'a ExamWriter,
+    pub(super) facts: &'a Facts,
+    pub(super) progress: &'a dyn Progress,
+    pub(super) step: &'static str,
+    pub(super) stand: &'a dyn Fn() -> Stand,
+    pub(super) recording: Option<&'a mut Recording>,
+    pub(super) eye: Option<Eye<'a>>,
+    pub(super) figures: Option<&'a mut Figures>,
+    /// The last tick's stamp.
+    pub(super) now: Stamp,
+}
+
+/// The bar moves five times a second of exam time.
+const TICKS_BETWEEN_BARS: u64 = 100;
+
+impl Observer for Recorder<'_> {
+    fn tick(&mut self, tick: &Tick) -> Wish {
+        let (stand, state) = ((self.stand)(), &tick.state);
+        let base_from_probe = self.facts.base_from_probe(&state.position);
+        self.now = state.stamp;
+        if let Some(recording) = &mut self.recording {
+            let (stamp, wrench, guiding) = (state.stamp, state.wrench, state.guiding);
+            recording.push(Sample { stamp, base_from_probe, wrench, guiding });
+        }
+        if let Some(figures) = &mut self.figures
+            && !tick.braking
+        {
+            figures.tick(tick, &stand, &base_from_probe);
+        }
+        if tick.index.is_multiple_of(TICKS_BETWEEN_BARS) {
+            self.progress.at(self.step, stand.fraction);
+        }
+        if let Some(fault) = self.exam.fault() {
+            return Wish::Stop(format!("the exam cannot be recorded: {fault}"));
+        }
+        let Some(eye) = &mut self.eye else { return Wish::GoOn };
+        let world_from_probe = self.facts.world_from_base * base_from_probe;
+        let looked = match stand.along_m {
+            Some(_) => eye.look(state, world_from_probe, self.exam),
+            None => eye.wait(state.stamp, self.exam),
+        };
+        looked.unwrap_or_else(|error| Wish::Stop(error.to_string()))
+    }
+}
+
+impl Eye<'_> {
+    /// Before and after the path nothing is looked at, but for B-scans that were formed on it and arrive late.
+    fn wait(&mut self, now: Stamp, exam: &ExamWriter) -> Result<Wish, CaptureError> {
+        if self.followed.is_some_and(|last| now - last < LATEST) {
+            self.take(now, exam)?;
+        } else {
+            self.machine.skip(now)?;
+        }
+        Ok(Wish::GoOn)
+    }
+
+    /// Takes what the machine has, and keeps what the capture wants.
+    fn take(&mut self, now: Stamp, exam: &ExamWriter) -> Result<(), CaptureError> {
+        self.capture.poll(self.machine, now)?;
+        while let Some(placed) = self.capture.take() {
+            exam.bscan(placed.clone());
+            self.images.push(placed);
+        }
+        Ok(())
+    }
+
+    /// Takes what the machine has, keeps what the capture wants, and holds the probe still while nothing comes.
+    fn look(
+        &mut self,
+        state: &State,
+        world_from_probe: Pose<World, Probe>,
+        exam: &ExamWriter,
+    ) -> Result<Wish, CaptureError> {
+        self.followed = Some(state.stamp);
+        self.capture.tick(state.stamp, world_from_probe, Some(state.wrench))?;
+        self.take(state.stamp, exam)?;
+        match self.capture.stalled(state.stamp) {
+            Some(silence) if silence > LONGEST_SILENCE => {
+                let seconds = silence.seconds();
+                return Ok(Wish::Stop(format!(
+                    "the ultrasound machine has sent nothing for {seconds:.1} s: is it frozen, is its cable in?"
+                )));
+            }
+            Some(_) if !self.paused => {
+                self.operator.pause();
+                self.paused = true;
+            }
+            None if self.paused => {
+                self.operator.resume();
+                self.paused = false;
+            }
+            _ => {}
+        }
+        Ok(Wish::GoOn)
+    }
+}

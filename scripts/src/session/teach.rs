@@ -1,0 +1,146 @@
+//! Teaching: the arm gives way to the hand while every state is recorded, and the stream becomes a path.
+
+use std::path::PathBuf;
+
+use probepath_frames::{Direction, Point, World};
+use probepath_robot::GuardLimits;
+use probepath_teach_replay::{Cleaning, GiveWay, HandGuide, Label, Path, ProbeArm, Recording, Side};
+use probepath_us_capture::exam::Attachment;
+
+use super::recorder::{Recorder, Stand, Taped};
+use super::{Session, SessionError, motion};
+
+/// How a path is to be taught.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TeachWish {
+    /// The study's code, never a name.
+    pub study: String,
+    /// Which leg.
+    pub side: Side,
+}
+
+impl Default for TeachWish {
+    fn default() -> Self {
+        Self { study: "STUDY".into(), side: Side::Left }
+    }
+}
+
+/// Room for ten minutes of guiding at 500 ticks a second.
+const MOST_SAMPLES: usize = 300_000;
+
+const TEACHING: Stand = Stand { phase: "teach", along_m: None, fraction: 0.0 };
+
+impl Session {
+    /// The operator guides the probe along the artery; what comes back is the cleaned path.
+    ///
+    /// # Errors
+    /// When the motion was stopped, or what was taught makes no path.
+    pub fn teach(&mut self, wish: &TeachWish) -> Result<Path, SessionError> {
+        self.begin_exam(&wish.study)?;
+        self.say("Hold the switch, guide the probe along the artery, lift it off, let go.");
+        let mut recording = Recording::with_capacity(MOST_SAMPLES);
+        // The hand stands in for the operator's; a real one would take the handle now.
+        self.cell.simulated.hand().guide();
+        self.guide(&mut recording)?;
+        let label = Label {
+            study: wish.study.clone(),
+            side: wish.side,
+            date: self.opening.date.clone().unwrap_or_else(|| "simulated".into()),
+        };
+        let (path, report) = Path::clean(recording.samples(), label, &Cleaning::default())?;
+        self.smoothed_m = Some(report.moved_most);
+        self.say(&format!(
+            "Taught {:.0} mm: {} of {} states used, {:.1} s of pauses left out, smoothing moved the path by at most \
+             {:.2} mm.",
+            path.length() * 1e3,
+            report.used,
+            report.samples,
+            report.pauses_s,
+            report.moved_most * 1e3
+        ));
+        self.attach_path(&path)?;
+        Ok(path)
+    }
+
+    fn guide(&mut self, recording: &mut Recording) -> Result<(), SessionError> {
+        let arm = self.cell.probe_arm();
+        let usual = *self.guard.limits();
+        self.guard.set_limits(GuardLimits::hand_guiding());
+        let stand = || TEACHING;
+        let exam = self.exam.as_ref().ok_or(SessionError::Order("the exam was not begun"))?;
+        let facts = &self.cell.facts;
+        let mut taped = Taped { arm: &mut *self.cell.arm, exam, facts, stand: &stand };
+        let start = motion::ask("teaching", &mut taped)?.commanded;
+        let mut controller = HandGuide::new(arm, &start, GiveWay::default())?;
+        let mut recorder = Recorder {
+            exam,
+            facts,
+            progress: &*self.opening.progress,
+            step: "teaching",
+            stand: &stand,
+            recording: Some(recording),
+            eye: None,
+            figures: None,
+            now: self.now,
+        };
+        let done = motion::perform("teaching", &mut taped, &mut controller, &mut self.guard, &mut recorder);
+        self.now = recorder.now;
+        self.guard.set_limits(usual);
+        done
+    }
+
+    /// Keeps a path in the exam.
+    pub(super) fn attach_path(&mut self, path: &Path) -> Result<(), SessionError> {
+        let text = path.to_text()?;
+        if let Some(exam) = &self.exam {
+            exam.attach(Attachment::path(text));
+        }
+        Ok(())
+    }
+
+    /// A path of an earlier session.
+    ///
+    /// # Errors
+    /// When the file is none.
+    pub fn load_path(&mut self, name: &str) -> Result<Path, SessionError> {
+        Ok(Path::load(&PathBuf::from(name))?)
+    }
+
+    /// Saves a path into the session's folder.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn save_path(&mut self, path: &Path, name: &str) -> Result<(), SessionError> {
+        Ok(path.save(&self.file(name))?)
+    }
+
+    /// The part of a path between two distances along it (m).
+    ///
+    /// # Errors
+    /// When they lie outside it.
+    pub fn trim(&mut self, path: &Path, from_m: f64, until_m: f64) -> Result<Path, SessionError> {
+        Ok(path.trimmed(from_m, until_m)?)
+    }
+
+    /// The path for the other leg: mirrored in the table's midline, the World's plane x = 0.
+    ///
+    /// # Errors
+    /// When the mirrored poses make no path.
+    pub fn mirrored(&mut self, path: &Path) -> Result<Path, SessionError> {
+        let base_from_world = self.cell.facts.world_from_base.inverse();
+        let (point, normal) = (Point::<World>::new(0.0, 0.0, 0.0), Direction::<World>::x());
+        Ok(path.mirrored(base_from_world * point, base_from_world * normal)?)
+    }
+}
+
+impl super::cell::Cell {
+    /// The arm as planning and moving see it.
+    pub(super) fn probe_arm(&self) -> ProbeArm {
+        ProbeArm {
+            model: self.facts.model.clone(),
+            flange_from_probe: self.facts.flange_from_probe,
+            limits: self.limits,
+            period: self.arm.period(),
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! What only a simulation knows: how far a reconstruction is from the lumen that was truly there. Asked after the
+//! reconstruction has given its answer; nothing here flows back into it.
+
+use probepath_recon::{Fit, LumenReconstruction, Mesh, compare};
+use probepath_sim::{Truth, Vessel};
+use serde::Serialize;
+
+use super::Scan;
+use crate::report::SurfaceError;
+
+/// How much true surface lies beyond the reconstructed one at both ends (m), so that no end is compared with an edge.
+const BEYOND_M: f64 = 0.015;
+/// Distance of the true surface's rings (m), and points in each.
+const RING_M: f64 = 0.0005;
+const AROUND: usize = 72;
+
+/// A true stenosis beside the one that was found there.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct StenosisError {
+    /// Lost area in truth (percent).
+    pub true_percent_area: f64,
+    /// Lost area as found (percent); none when nothing was found within a centimetre.
+    pub found_percent_area: Option<f64>,
+}
+
+/// Distance of the reconstructed grid's measured points from the true lumen after a rigid fit ([P1] eq. 6).
+pub(super) fn surface_error(truth: &Truth, recon: &LumenReconstruction) -> Option<SurfaceError> {
+    let mut distances = error_map(truth, recon)?;
+    distances.sort_by(f64::total_cmp);
+    let p95 = *distances.get(distances.len() * 95 / 100)?;
+    Some(SurfaceError { mean: distances.iter().sum::<f64>() / distances.len() as f64, p95 })
+}
+
+/// Distances of the grid's points (mm), but for rows that no image shows: those only bridge a gap.
+fn error_map(truth: &Truth, recon: &LumenReconstruction) -> Option<Vec<f64>> {
+    let vessel = truth.subject().main();
+    let (from, until) = reach(vessel, recon)?;
+    let rings = (((until - from) / RING_M).ceil() as usize).max(2);
+    let grid = vessel.surface(from..until, rings, AROUND);
+    let gold = Mesh::tube(&grid.points, (grid.along, grid.around));
+    let surface = &recon.surface;
+    let compared = compare(&surface.mesh(), &gold, Fit::Near).ok()?;
+    let rows = compared.error_mm.chunks(surface.around).zip(&surface.measured);
+    let seen = rows.filter(|(_, measured)| **measured).flat_map(|(row, _)| row.iter().copied());
+    Some(seen.collect())
+}
+
+/// The arc lengths of the true vessel that the reconstruction covers, and a little beyond.
+fn reach(vessel: &Vessel, recon: &LumenReconstruction) -> Option<(f64, f64)> {
+    let ends = [recon.centreline.at(0.0)?, recon.centreline.at(recon.centreline.length_m())?];
+    let [a, b] = ends.map(|end| vessel.nearest(end.point));
+    Some(((a.min(b) - BEYOND_M).max(0.0), (a.max(b) + BEYOND_M).min(vessel.length_m())))
+}
+
+/// Every true stenosis that lies whole inside the reconstruction, beside what was found.
+pub(super) fn stenoses(truth: &Truth, recon: &LumenReconstruction) -> Vec<StenosisError> {
+    let vessel = truth.subject().main();
+    let Some((from, until)) = reach(vessel, recon) else { return Vec::new() };
+    let covered = (from + BEYOND_M, until - BEYOND_M);
+    let inside = |s: &&probepath_sim::Stenosis| {
+        s.at_m - s.length_m > covered.0 && s.at_m + s.length_m < covered.1
+    };
+    vessel
+        .stenoses()
+        .iter()
+        .filter(inside)
+        .map(|stenosis| StenosisError {
+            true_percent_area: 100.0 * stenosis.area_fraction,
+            found_percent_area: found_near(vessel, stenosis.at_m, recon),
+        })
+        .collect()
+}
+
+fn found_near(vessel: &Vessel, at_m: f64, recon: &LumenReconstruction) -> Option<f64> {
+    recon
+        .stenoses
+        .iter()
+        .filter_map(|found| {
+            let place = recon.centreline.at(found.at_mm * 1e-3)?.point;
+            Some(((vessel.nearest(place) - at_m).abs(), found.percent_area))
+        })
+        .filter(|(away, _)| *away < 0.010)
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, percent)| percent)
+}
+
+/// RMS error of the true pressing force while the path was followed (N).
+pub(super) fn force_rms(truth: &Truth, scan: &Scan) -> Option<f64> {
+    let (from, until) = scan.followed?;
+    let set = scan.wish.force_n;
+    let squares: Vec<f64> = truth
+        .moments()
+        .iter()
+        .filter(|moment| (from..=until).contains(&moment.stamp))
+        .map(|moment| (-moment.skin.force.z - set).powi(2))
+        .collect();
+    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+}

@@ -1,0 +1,69 @@
+//! What every validation does: a session of one seed, taught and scanned.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use probepath_robot::Operator;
+
+use super::ValidateError;
+use crate::progress::Progress;
+use crate::protocol::Protocol;
+use crate::session::{CellFile, Opening, Scan, ScanWish, Session, SessionError, TeachWish};
+
+/// One taught and scanned seed.
+pub(super) struct Bench {
+    pub(super) session: Session,
+    pub(super) scan: Scan,
+}
+
+/// Teaches and scans one seed in a folder of its own.
+pub(super) fn taught_and_scanned(
+    cell: &CellFile,
+    seed: u64,
+    wish: &ScanWish,
+    out: &Path,
+) -> Result<Bench, ValidateError> {
+    let wrong = |source: SessionError| ValidateError::Session { seed, source };
+    let mut session = Session::open(Opening {
+        cell: cell.clone(),
+        seed,
+        out: out.to_owned(),
+        protocol: Protocol { name: "validate".into(), text: String::new() },
+        date: None,
+        operator: Operator::new(),
+        progress: Arc::new(()),
+    })
+    .map_err(wrong)?;
+    let path = session.teach(&TeachWish { study: "VALIDATE".into(), ..TeachWish::default() }).map_err(wrong)?;
+    let scan = session.scan(&path, wish).map_err(wrong)?;
+    Ok(Bench { session, scan })
+}
+
+/// A folder for the exams of a validation, gone when it is done.
+pub(super) struct Folder(std::path::PathBuf);
+
+impl Folder {
+    /// A new folder of this process.
+    pub(super) fn new(name: &str) -> Result<Self, std::io::Error> {
+        let path = std::env::temp_dir().join(format!("probepath-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&path)?;
+        Ok(Self(path))
+    }
+
+    /// Where it is.
+    pub(super) fn path(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // What cannot be removed stays in the system's folder for such things.
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// Tells how far a validation is.
+pub(super) fn tell(progress: &dyn Progress, what: &str, done: u64, of: u64) {
+    progress.at(what, done as f64 / of.max(1) as f64);
+}

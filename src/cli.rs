@@ -1,0 +1,140 @@
+//! What can be typed.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+
+/// An ultrasound probe on a robot arm: taught by hand, replayed at constant force, reconstructed in 3D.
+/// Without a command it scans the simulated leg. A research tool, not a medical device.
+#[derive(Debug, Parser)]
+#[command(version, about, args_conflicts_with_subcommands = true)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    /// One JSON document on standard output; people's text goes to standard error.
+    #[arg(long, global = true)]
+    pub json: bool,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Teach, replay, capture, reconstruct, report.
+    Scan(Scan),
+    /// The lumen of an exam once more, or the volume of a tracked sequence.
+    Reconstruct(Reconstruct),
+    /// How far a surface is from a gold standard.
+    Compare(Compare),
+    /// Between the formats of sequences (.igs.mha, .igs.mhd, .igs.nrrd), volumes (.mha, .nrrd), surfaces (.stl, .ply,
+    /// .vtp) and exams (.mcap, read only).
+    Convert(Convert),
+    /// What the model of an arm says; forward and inverse kinematics.
+    Arm(Arm),
+    /// Prints a table: ours beside the published figure.
+    Validate(Validate),
+}
+
+impl Default for Command {
+    fn default() -> Self {
+        Self::Scan(Scan { protocol: None, cell: None, seed: 1, out: PathBuf::from("out") })
+    }
+}
+
+/// `scan`
+#[derive(Args, Debug)]
+pub struct Scan {
+    /// The protocol, a Rhai script; the femoral artery when none is given.
+    pub protocol: Option<PathBuf>,
+    /// The cell: arm, limits, probe. The simulated cell when none is given.
+    #[arg(long, value_name = "CELL.toml")]
+    pub cell: Option<PathBuf>,
+    /// Seed of the simulated cell; the same seed gives the same exam.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Folder for the exam, the report and the surfaces.
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    pub out: PathBuf,
+}
+
+/// `reconstruct`
+#[derive(Args, Debug)]
+pub struct Reconstruct {
+    /// An exam (.mcap) or a tracked sequence (.igs.mha, .igs.mhd, .igs.nrrd).
+    pub input: PathBuf,
+    /// The calibration: probepath's own (.toml) or a PLUS device set (.xml). An exam holds its own.
+    #[arg(long, value_name = "FILE")]
+    pub calibration: Option<PathBuf>,
+    /// Build the volume.
+    #[arg(long)]
+    pub volume: bool,
+    /// Folder for what is made.
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    pub out: PathBuf,
+}
+
+/// `compare`
+#[derive(Args, Debug)]
+pub struct Compare {
+    /// The surface (.stl, .ply, .vtp), mm.
+    pub surface: PathBuf,
+    /// The gold standard (.stl, .ply, .vtp), mm.
+    #[arg(long, value_name = "SURFACE")]
+    pub gold: PathBuf,
+    /// Compare where they are: no rigid fit first.
+    #[arg(long)]
+    pub in_place: bool,
+}
+
+/// `convert`
+#[derive(Args, Debug)]
+pub struct Convert {
+    /// What to read.
+    pub input: PathBuf,
+    /// What to write; the ending says the format.
+    pub output: PathBuf,
+}
+
+/// `arm`
+#[derive(Args, Debug)]
+pub struct Arm {
+    /// A URDF file, or the name of a model that comes along: `ur5e`, `seven_joint`.
+    pub urdf: String,
+    /// The chain's first link.
+    #[arg(long, value_name = "LINK")]
+    pub base: Option<String>,
+    /// The chain's last link.
+    #[arg(long, value_name = "LINK")]
+    pub tip: Option<String>,
+    /// Joint positions (degrees; mm for a prismatic joint), separated by commas: where is the flange?
+    #[arg(long, value_name = "Q1,Q2,…", value_delimiter = ',', allow_hyphen_values = true)]
+    pub joints_deg: Option<Vec<f64>>,
+    /// Where the flange should be: x, y, z (mm) and rotation vector (degrees), separated by commas: which joints?
+    #[arg(long, value_name = "X,Y,Z,RX,RY,RZ", value_delimiter = ',', allow_hyphen_values = true)]
+    pub flange_mm_deg: Option<Vec<f64>>,
+}
+
+/// `validate`
+#[derive(Args, Debug)]
+pub struct Validate {
+    /// What to validate.
+    #[arg(value_enum)]
+    pub goal: Goal,
+    /// How many seeds.
+    #[arg(long, default_value_t = 10)]
+    pub seeds: u64,
+    /// Only this setting of the table ("zoom 3:7").
+    #[arg(long, value_name = "NAME")]
+    pub setting: Option<String>,
+}
+
+/// What can be validated.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+pub enum Goal {
+    /// Table II of the paper: the error of the reconstructed phantom, setting by setting.
+    Table2,
+    /// The contact force along the leg.
+    Force,
+    /// Every commanded motion within the limits, read back from the exam; the path's error.
+    Motion,
+}

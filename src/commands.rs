@@ -1,0 +1,57 @@
+//! Each command: what was typed, brought to the room that does it.
+
+use std::error::Error;
+
+use probepath_scripts::{Operator, ScanRequest, offline, validate};
+
+use crate::cli::{Command, Goal};
+use crate::screen::{Document, Screen};
+
+type Outcome = Result<Document, Box<dyn Error>>;
+
+/// Does what was typed.
+///
+/// # Errors
+/// Whatever the work's room says went wrong.
+pub fn perform(command: Command, screen: &Screen) -> Outcome {
+    let document = match command {
+        Command::Scan(args) => return scan(args, screen),
+        Command::Reconstruct(args) => Document::of(&offline::reconstruct(
+            &args.input,
+            args.calibration.as_deref(),
+            args.volume,
+            &args.out,
+            &*screen.progress(),
+        )?),
+        Command::Compare(args) => Document::of(&offline::compare(&args.surface, &args.gold, !args.in_place)?),
+        Command::Convert(args) => Document::of(&offline::convert(&args.input, &args.output)?),
+        Command::Arm(args) => Document::of(&offline::arm(&offline::ArmQuestion {
+            urdf: args.urdf,
+            base: args.base,
+            tip: args.tip,
+            joints_deg: args.joints_deg,
+            flange_mm_deg: args.flange_mm_deg,
+        })?),
+        Command::Validate(args) => return validated(&args, screen),
+    };
+    Ok(document?)
+}
+
+fn scan(args: crate::cli::Scan, screen: &Screen) -> Outcome {
+    let operator = Operator::new();
+    let stopping = operator.clone();
+    // A second Ctrl-C does nothing more: the first one already brakes the arm, and the exam has to be closed.
+    ctrlc::set_handler(move || stopping.stop())?;
+    let request =
+        ScanRequest { protocol: args.protocol, cell: args.cell, seed: args.seed, out: args.out, date: None };
+    Ok(Document::of(&request.run(&operator, screen.progress())?)?)
+}
+
+fn validated(args: &crate::cli::Validate, screen: &Screen) -> Outcome {
+    let (progress, seeds) = (screen.progress(), args.seeds);
+    Ok(match args.goal {
+        Goal::Table2 => Document::of(&validate::table2(seeds, args.setting.as_deref(), &*progress)?),
+        Goal::Force => Document::of(&validate::force(seeds, &*progress)?),
+        Goal::Motion => Document::of(&validate::motion(seeds, &*progress)?),
+    }?)
+}
