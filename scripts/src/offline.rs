@@ -10,4 +10,4 @@ mod reconstruct;
 pub use arm::{ArmAnswer, ArmError, ArmQuestion, arm};
 pub use compare::{CompareError, Comparison, compare};
 pub use convert::{ConvertError, Converted, convert};
-pub use reconstruct::{Reconstructed, ReconstructError, reconstruct};
+pub use reconstruct::{ReconstructError, Reconstructed, reconstruct};

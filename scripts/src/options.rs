@@ -95,7 +95,10 @@ mod tests {
     #[test]
     fn a_bare_number_is_refused_with_the_way_to_write_it() {
         let error = options("#{ force: 5 }").quantity::<Force>("force").unwrap_err();
-        assert_eq!(error, "scan: `force` is a force, written as newton(5); found 5, a bare number without a unit");
+        assert_eq!(
+            error,
+            "scan: `force` is a force, written as newton(5); found 5, a bare number without a unit"
+        );
     }
 
     #[test]

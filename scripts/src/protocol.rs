@@ -192,11 +192,15 @@ fn explain(
     match innermost(error) {
         EvalAltResult::ErrorTerminated(..) => ProtocolError::Stopped { file },
         EvalAltResult::ErrorTooManyOperations(_) => ProtocolError::Endless { file, place },
-        EvalAltResult::ErrorParsing(kind, _) => ProtocolError::Syntax { file, place, message: kind.to_string() },
+        EvalAltResult::ErrorParsing(kind, _) => {
+            ProtocolError::Syntax { file, place, message: kind.to_string() }
+        }
         EvalAltResult::ErrorFunctionNotFound(signature, _) => {
             ProtocolError::Script { file, place, message: not_found(signature) }
         }
-        EvalAltResult::ErrorRuntime(value, _) => ProtocolError::Script { file, place, message: value.to_string() },
+        EvalAltResult::ErrorRuntime(value, _) => {
+            ProtocolError::Script { file, place, message: value.to_string() }
+        }
         other => {
             let mut bare = format!("{other}");
             if let Some(at) = bare.rfind(" (line ") {

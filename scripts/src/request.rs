@@ -76,10 +76,17 @@ impl ScanRequest {
         if let Err(source) = ran {
             let kept = match &closed {
                 Ok(Some(written)) => {
-                    format!("{} ticks and {} B-scans are kept in {}.", written.ticks, written.bscans, exam.display())
+                    format!(
+                        "{} ticks and {} B-scans are kept in {}.",
+                        written.ticks,
+                        written.bscans,
+                        exam.display()
+                    )
                 }
                 Ok(None) => "Nothing was recorded.".to_owned(),
-                Err(error) => format!("The exam is readable as far as it was written ({error}): {}.", exam.display()),
+                Err(error) => {
+                    format!("The exam is readable as far as it was written ({error}): {}.", exam.display())
+                }
             };
             return Err(ScanError::Ended { source, kept });
         }
@@ -92,7 +99,8 @@ impl ScanRequest {
         let Some(path) = &self.protocol else { return Ok(Protocol::femoral()) };
         let text = std::fs::read_to_string(path)
             .map_err(|source| ScanError::Protocol { path: path.clone(), source })?;
-        let name = path.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned());
+        let name =
+            path.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned());
         Ok(Protocol { name, text })
     }
 }

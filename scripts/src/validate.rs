@@ -132,7 +132,11 @@ impl fmt::Display for Goals {
             };
             let published = row.published.as_deref().unwrap_or("");
             let mean = format!("{:.3} ± {:.3}", row.mean, row.sd);
-            writeln!(f, "{:<44} {mean:>16} {:>8.3} {bound:>8}  {published:<16} {mark}", row.figure, row.worst)?;
+            writeln!(
+                f,
+                "{:<44} {mean:>16} {:>8.3} {bound:>8}  {published:<16} {mark}",
+                row.figure, row.worst
+            )?;
         }
         write!(f, "{}", if self.reached { "every bound was kept" } else { "a bound was MISSED" })
     }

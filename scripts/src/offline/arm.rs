@@ -92,7 +92,9 @@ pub enum ArmError {
         names: String,
     },
     /// A pose that is not six finite numbers.
-    #[error("a flange pose is six finite numbers (x, y, z in mm, rotation vector in degrees); {given} were given")]
+    #[error(
+        "a flange pose is six finite numbers (x, y, z in mm, rotation vector in degrees); {given} were given"
+    )]
     Pose {
         /// Given.
         given: usize,
@@ -136,7 +138,8 @@ fn load(question: &ArmQuestion) -> Result<(Model, Vec<String>), ArmError> {
         ("seven_joint", None, None) => return Ok((Model::seven_joint(), Vec::new())),
         _ => {}
     }
-    let (base, tip) = (question.base.as_deref().unwrap_or("base_link"), question.tip.as_deref().unwrap_or("tool0"));
+    let (base, tip) =
+        (question.base.as_deref().unwrap_or("base_link"), question.tip.as_deref().unwrap_or("tool0"));
     let (model, warnings) = Model::from_urdf_file(Path::new(&question.urdf), base, tip)?;
     Ok((model, warnings.iter().map(ToString::to_string).collect()))
 }
@@ -165,9 +168,13 @@ fn inverse(model: &Model, pose: &[f64]) -> Result<Vec<f64>, ArmError> {
     }
     let turn = UnitQuaternion::from_scaled_axis(Vector3::new(rx, ry, rz).map(f64::to_radians));
     // FRAMES: the question names the flange's pose in the base, in the units of its name.
-    let target = Pose::<Base, Flange>::assume(Isometry3::from_parts(Translation3::new(x * 1e-3, y * 1e-3, z * 1e-3), turn));
+    let target = Pose::<Base, Flange>::assume(Isometry3::from_parts(
+        Translation3::new(x * 1e-3, y * 1e-3, z * 1e-3),
+        turn,
+    ));
     let middle = middle(model);
-    let joints = model.inverse(&target, &Pose::<Flange, Flange>::identity(), &middle, &InverseOptions::default())?;
+    let joints =
+        model.inverse(&target, &Pose::<Flange, Flange>::identity(), &middle, &InverseOptions::default())?;
     Ok(joints.iter().map(f64::to_degrees).collect())
 }
 
@@ -186,7 +193,11 @@ impl fmt::Display for ArmAnswer {
         writeln!(f, "{}: {} joints from {} to {}", self.name, self.joints.len(), self.base, self.tip)?;
         for joint in &self.joints {
             let (low, high, speed) = (joint.lower_deg, joint.upper_deg, joint.velocity_deg_s);
-            writeln!(f, "  {:<24} {low:>8.1} to {high:>7.1} degrees, at most {speed:.0} degrees/s", joint.name)?;
+            writeln!(
+                f,
+                "  {:<24} {low:>8.1} to {high:>7.1} degrees, at most {speed:.0} degrees/s",
+                joint.name
+            )?;
         }
         for warning in &self.warnings {
             writeln!(f, "  note: {warning}")?;
@@ -194,7 +205,10 @@ impl fmt::Display for ArmAnswer {
         if let Some(forward) = &self.forward {
             let [x, y, z] = forward.position_mm;
             let [rx, ry, rz] = forward.rotation_deg;
-            writeln!(f, "flange at {x:.3}, {y:.3}, {z:.3} mm, rotation vector {rx:.3}, {ry:.3}, {rz:.3} degrees")?;
+            writeln!(
+                f,
+                "flange at {x:.3}, {y:.3}, {z:.3} mm, rotation vector {rx:.3}, {ry:.3}, {rz:.3} degrees"
+            )?;
             writeln!(
                 f,
                 "smallest singular value {:.4}, manipulability {:.4}",
@@ -217,16 +231,21 @@ mod tests {
     fn there_and_back_is_home() {
         let joints = vec![10.0, -90.0, 80.0, -80.0, -90.0, 5.0];
         let there =
-            arm(&ArmQuestion { urdf: "ur5e".into(), joints_deg: Some(joints), ..ArmQuestion::default() }).unwrap();
+            arm(&ArmQuestion { urdf: "ur5e".into(), joints_deg: Some(joints), ..ArmQuestion::default() })
+                .unwrap();
         let forward = there.forward.unwrap();
         let flange: Vec<f64> = forward.position_mm.into_iter().chain(forward.rotation_deg).collect();
-        let back =
-            arm(&ArmQuestion { urdf: "ur5e".into(), flange_mm_deg: Some(flange.clone()), ..ArmQuestion::default() })
+        let back = arm(&ArmQuestion {
+            urdf: "ur5e".into(),
+            flange_mm_deg: Some(flange.clone()),
+            ..ArmQuestion::default()
+        })
+        .unwrap();
+        let again =
+            arm(&ArmQuestion { urdf: "ur5e".into(), joints_deg: back.inverse_deg, ..ArmQuestion::default() })
+                .unwrap()
+                .forward
                 .unwrap();
-        let again = arm(&ArmQuestion { urdf: "ur5e".into(), joints_deg: back.inverse_deg, ..ArmQuestion::default() })
-            .unwrap()
-            .forward
-            .unwrap();
         for (a, b) in again.position_mm.iter().zip(&flange) {
             assert!((a - b).abs() < 1e-6, "{again:?}");
         }
@@ -234,7 +253,8 @@ mod tests {
 
     #[test]
     fn five_joints_for_six_are_refused_by_name() {
-        let five = ArmQuestion { urdf: "ur5e".into(), joints_deg: Some(vec![0.0; 5]), ..ArmQuestion::default() };
+        let five =
+            ArmQuestion { urdf: "ur5e".into(), joints_deg: Some(vec![0.0; 5]), ..ArmQuestion::default() };
         assert!(arm(&five).unwrap_err().to_string().contains("wrist_3_joint"));
     }
 }

@@ -66,10 +66,22 @@ impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (there, back) = (&self.error, &self.gold_error);
         writeln!(f, "{} against {}", self.surface.display(), self.gold.display())?;
-        writeln!(f, "error      {:.3} ± {:.3} mm over {} points ([P1] eq. 6)", there.mean_mm, there.sd_mm, there.count)?;
+        writeln!(
+            f,
+            "error      {:.3} ± {:.3} mm over {} points ([P1] eq. 6)",
+            there.mean_mm, there.sd_mm, there.count
+        )?;
         writeln!(f, "RMS        {:.3} mm, 95th percentile {:.3} mm", there.rms_mm, there.p95_mm)?;
-        writeln!(f, "back       {:.3} ± {:.3} mm, Hausdorff {:.3} mm", back.mean_mm, back.sd_mm, self.hausdorff_mm)?;
-        writeln!(f, "area       {:+.1} % on average, {:.1} % in magnitude", self.area_error_percent, self.area_error_abs_percent)?;
+        writeln!(
+            f,
+            "back       {:.3} ± {:.3} mm, Hausdorff {:.3} mm",
+            back.mean_mm, back.sd_mm, self.hausdorff_mm
+        )?;
+        writeln!(
+            f,
+            "area       {:+.1} % on average, {:.1} % in magnitude",
+            self.area_error_percent, self.area_error_abs_percent
+        )?;
         write!(f, "fit        turned by {:.2} degrees", self.turned_deg)
     }
 }

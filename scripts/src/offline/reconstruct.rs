@@ -7,7 +7,9 @@ use probepath_recon::volume::{Layer, Mark, Slice, Volume, VolumeError, VolumeSet
 use probepath_recon::{LumenSettings, ReconError, reconstruct_lumen};
 use probepath_us_capture::exam::{Attachment, Ending, Exam, ExamError};
 use probepath_us_capture::plus::{PlusConfig, PlusError};
-use probepath_us_capture::sequence::{NoChain, PlacedSequence, Placing, ReadOptions, Sequence, SequenceError};
+use probepath_us_capture::sequence::{
+    NoChain, PlacedSequence, Placing, ReadOptions, Sequence, SequenceError,
+};
 use probepath_us_capture::{BadCalibration, BadPixelMap, Calibration, PixelMap, PlacedBScan};
 use serde::Serialize;
 use thiserror::Error;
@@ -126,21 +128,33 @@ pub fn reconstruct(
     if input.extension().is_some_and(|ending| ending == "mcap") {
         exam(input, volume, out, progress)
     } else {
-        let calibration = calibration.ok_or_else(|| ReconstructError::NoCalibration { path: input.into() })?;
+        let calibration =
+            calibration.ok_or_else(|| ReconstructError::NoCalibration { path: input.into() })?;
         sequence(input, calibration, volume, out, progress)
     }
 }
 
-fn exam(input: &Path, volume: bool, out: &Path, progress: &dyn Progress) -> Result<Reconstructed, ReconstructError> {
+fn exam(
+    input: &Path,
+    volume: bool,
+    out: &Path,
+    progress: &dyn Progress,
+) -> Result<Reconstructed, ReconstructError> {
     progress.at("reading", 0.0);
     let exam = Exam::open(input)?;
     if exam.bscans.is_empty() {
         return Err(ReconstructError::NoImages { path: input.into() });
     }
-    let mut notes: Vec<String> =
-        exam.damaged.iter().map(|(at, why)| format!("damaged at byte {at}: {why}; the rest was read")).collect();
+    let mut notes: Vec<String> = exam
+        .damaged
+        .iter()
+        .map(|(at, why)| format!("damaged at byte {at}: {why}; the rest was read"))
+        .collect();
     if exam.ending != Ending::Complete {
-        notes.push(format!("the recording does not end as it should ({:?}); what is there was used", exam.ending));
+        notes.push(format!(
+            "the recording does not end as it should ({:?}); what is there was used",
+            exam.ending
+        ));
     }
     progress.at("reconstructing", 0.2);
     let recon = reconstruct_lumen(&exam.bscans, &LumenSettings::default())?;
@@ -160,7 +174,14 @@ fn exam(input: &Path, volume: bool, out: &Path, progress: &dyn Progress) -> Resu
     let report = make(&from, out)?;
     let volume = volume.then(|| of_images(&exam.bscans, out)).transpose()?;
     let images = exam.bscans.len();
-    Ok(Reconstructed { input: input.into(), images, left_out: Vec::new(), notes, report: Some(report), volume })
+    Ok(Reconstructed {
+        input: input.into(),
+        images,
+        left_out: Vec::new(),
+        notes,
+        report: Some(report),
+        volume,
+    })
 }
 
 /// An attachment of our own that was kept as JSON.
@@ -214,7 +235,11 @@ fn sequence(
     Ok(Reconstructed {
         input: input.into(),
         images: placed.images.len(),
-        left_out: placed.skipped.iter().map(|(why, count)| format!("{count} images left out: {why}")).collect(),
+        left_out: placed
+            .skipped
+            .iter()
+            .map(|(why, count)| format!("{count} images left out: {why}"))
+            .collect(),
         notes,
         report: None,
         volume: made,
@@ -234,7 +259,11 @@ fn chain(calibration: &Path) -> Result<(Placing, VolumeSettings), ReconstructErr
     Ok((Placing { lag: calibration.image_lag, ..Placing::new(map) }, VolumeSettings::every_mm(VOXEL_MM)))
 }
 
-fn build(slices: &[Slice<'_>], settings: &VolumeSettings, out: &Path) -> Result<VolumeMade, ReconstructError> {
+fn build(
+    slices: &[Slice<'_>],
+    settings: &VolumeSettings,
+    out: &Path,
+) -> Result<VolumeMade, ReconstructError> {
     let volume = Volume::build(slices, settings)?;
     let (file, marks) = (out.join("volume.mha"), out.join("volume-marks.mha"));
     volume.write(&file, Layer::Grey)?;
@@ -266,7 +295,12 @@ impl fmt::Display for Reconstructed {
                 "volume {x} x {y} x {z} of {sx:.3} x {sy:.3} x {sz:.3} mm, {} voxels seen, {} filled, {:.0} MB to build",
                 volume.seen, volume.filled, volume.memory_mb
             )?;
-            writeln!(f, "  {} (which voxels were seen or filled: {})", volume.file.display(), volume.marks.display())?;
+            writeln!(
+                f,
+                "  {} (which voxels were seen or filled: {})",
+                volume.file.display(),
+                volume.marks.display()
+            )?;
         }
         Ok(())
     }

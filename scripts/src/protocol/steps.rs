@@ -55,30 +55,43 @@ fn paths(engine: &mut Engine, stage: &Stage) {
         s.step(&context, |session| session.load_path(name)).map(Arc::new)
     });
     let s = stage.clone();
-    engine.register_fn("save", move |context: NativeCallContext, path: TaughtPath, name: &str| -> Outcome<()> {
-        s.step(&context, |session| session.save_path(&path, name))
-    });
+    engine.register_fn(
+        "save",
+        move |context: NativeCallContext, path: TaughtPath, name: &str| -> Outcome<()> {
+            s.step(&context, |session| session.save_path(&path, name))
+        },
+    );
     let s = stage.clone();
     engine.register_fn(
         "trim",
-        move |context: NativeCallContext, path: TaughtPath, from: Length, until: Length| -> Outcome<TaughtPath> {
+        move |context: NativeCallContext,
+              path: TaughtPath,
+              from: Length,
+              until: Length|
+              -> Outcome<TaughtPath> {
             s.step(&context, |session| session.trim(&path, from.si(), until.si())).map(Arc::new)
         },
     );
     let s = stage.clone();
-    engine.register_fn("mirrored", move |context: NativeCallContext, path: TaughtPath| -> Outcome<TaughtPath> {
-        s.step(&context, |session| session.mirrored(&path)).map(Arc::new)
-    });
+    engine.register_fn(
+        "mirrored",
+        move |context: NativeCallContext, path: TaughtPath| -> Outcome<TaughtPath> {
+            s.step(&context, |session| session.mirrored(&path)).map(Arc::new)
+        },
+    );
 }
 
 fn scans(engine: &mut Engine, stage: &Stage) {
     engine.register_type_with_name::<Arc<Scan>>("Scan");
     engine.register_get("kept", |scan: &mut Arc<Scan>| scan.images.len() as rhai::INT);
     let s = stage.clone();
-    engine.register_fn("scan", move |context: NativeCallContext, path: TaughtPath, map: Map| -> Outcome<Arc<Scan>> {
-        let wish = scan_wish(map).map_err(|e| wrong(&context, e))?;
-        s.step(&context, |session| session.scan(&path, &wish)).map(Arc::new)
-    });
+    engine.register_fn(
+        "scan",
+        move |context: NativeCallContext, path: TaughtPath, map: Map| -> Outcome<Arc<Scan>> {
+            let wish = scan_wish(map).map_err(|e| wrong(&context, e))?;
+            s.step(&context, |session| session.scan(&path, &wish)).map(Arc::new)
+        },
+    );
     let s = stage.clone();
     engine.register_fn("scan", move |context: NativeCallContext, path: TaughtPath| -> Outcome<Arc<Scan>> {
         s.step(&context, |session| session.scan(&path, &ScanWish::default())).map(Arc::new)
@@ -89,9 +102,12 @@ fn reports(engine: &mut Engine, stage: &Stage) {
     engine.register_type_with_name::<Arc<Lumen>>("Lumen");
     engine.register_type_with_name::<Segment>("Segment");
     let s = stage.clone();
-    engine.register_fn("reconstruct", move |context: NativeCallContext, scan: Arc<Scan>| -> Outcome<Arc<Lumen>> {
-        s.step(&context, |session| session.reconstruct(&scan, None)).map(Arc::new)
-    });
+    engine.register_fn(
+        "reconstruct",
+        move |context: NativeCallContext, scan: Arc<Scan>| -> Outcome<Arc<Lumen>> {
+            s.step(&context, |session| session.reconstruct(&scan, None)).map(Arc::new)
+        },
+    );
     let s = stage.clone();
     engine.register_fn(
         "reconstruct",
@@ -110,10 +126,13 @@ fn reports(engine: &mut Engine, stage: &Stage) {
         s.step(&context, |session| session.report(&lumen, &ReportWish::default()))
     });
     let s = stage.clone();
-    engine.register_fn("report", move |context: NativeCallContext, lumen: Arc<Lumen>, map: Map| -> Outcome<()> {
-        let wish = report_wish(map).map_err(|e| wrong(&context, e))?;
-        s.step(&context, |session| session.report(&lumen, &wish))
-    });
+    engine.register_fn(
+        "report",
+        move |context: NativeCallContext, lumen: Arc<Lumen>, map: Map| -> Outcome<()> {
+            let wish = report_wish(map).map_err(|e| wrong(&context, e))?;
+            s.step(&context, |session| session.report(&lumen, &wish))
+        },
+    );
     let s = stage.clone();
     engine.register_fn("warn", move |text: &str| lock(&s.session).warn(text));
 }

@@ -11,7 +11,8 @@ use super::html::{self, Pictures};
 use super::picture::Picture;
 use super::surface_picture::{self, Camera, SurfaceView};
 use super::{
-    AreaPoint, ForceFigures, Heading, ImageCounts, PathFigures, Report, SegmentRow, StenosisRow, SurfaceError, grade,
+    AreaPoint, ForceFigures, Heading, ImageCounts, PathFigures, Report, SegmentRow, StenosisRow,
+    SurfaceError, grade,
 };
 
 /// A named part of the artery, in distances along the reconstructed centreline (m).
@@ -239,7 +240,8 @@ fn surface_picture(lumen: &Ingredients<'_>, mesh: &Mesh) -> Option<Picture> {
 
 /// The median area stands for the open lumen.
 fn reference_area(recon: &LumenReconstruction) -> Option<f64> {
-    let mut areas: Vec<f64> = recon.sections.iter().filter_map(|s| Some(s.measure.as_ref()?.area_mm2)).collect();
+    let mut areas: Vec<f64> =
+        recon.sections.iter().filter_map(|s| Some(s.measure.as_ref()?.area_mm2)).collect();
     areas.sort_by(f64::total_cmp);
     areas.get(areas.len() / 2).copied()
 }
@@ -262,13 +264,18 @@ fn chosen<'a>(lumen: &Ingredients<'a>) -> Vec<Chosen<'a>> {
         .stenoses
         .iter()
         .enumerate()
-        .map(|(i, s)| (format!("S{}: {:.0} % of the area lost, at {:.0} mm", i + 1, s.percent_area, s.at_mm), s.at_mm))
+        .map(|(i, s)| {
+            (format!("S{}: {:.0} % of the area lost, at {:.0} mm", i + 1, s.percent_area, s.at_mm), s.at_mm)
+        })
         .collect();
     if let Some(open) = recon.sections.get(recon.sections.len() / 20) {
         wanted.insert(0, (format!("Near the proximal end, at {:.0} mm", open.at_mm), open.at_mm));
     }
     wanted.truncate(MOST_BSCANS);
-    wanted.into_iter().filter_map(|(caption, at_mm)| nearest(lumen, at_mm).map(|(i, c)| (caption, i, c))).collect()
+    wanted
+        .into_iter()
+        .filter_map(|(caption, at_mm)| nearest(lumen, at_mm).map(|(i, c)| (caption, i, c)))
+        .collect()
 }
 
 fn nearest<'a>(lumen: &Ingredients<'a>, at_mm: f64) -> Option<(&'a PlacedBScan, Option<&'a [(f64, f64)]>)> {

@@ -26,7 +26,9 @@ pub fn area_curve(points: &[(f64, f64)], marks: &[Mark]) -> String {
     let most = finite().map(|p| p.1).fold(1.0, f64::max) * 1.08;
     let x = |at: f64| LEFT + (at - start) / (longest - start).max(1e-9) * (WIDTH - LEFT - RIGHT);
     let y = |area: f64| HEIGHT - BOTTOM - area / most * (HEIGHT - TOP - BOTTOM);
-    let mut svg = format!("<svg viewBox='0 0 {WIDTH} {HEIGHT}' role='img' aria-label='lumen area along the centreline'>");
+    let mut svg = format!(
+        "<svg viewBox='0 0 {WIDTH} {HEIGHT}' role='img' aria-label='lumen area along the centreline'>"
+    );
     axes(&mut svg, (start, longest), most, &x, &y);
     for mark in marks {
         let at = x(mark.at_mm);
@@ -57,7 +59,13 @@ fn path(points: &[(f64, f64)], x: &impl Fn(f64) -> f64, y: &impl Fn(f64) -> f64)
     d
 }
 
-fn axes(svg: &mut String, (start, end): (f64, f64), most: f64, x: &impl Fn(f64) -> f64, y: &impl Fn(f64) -> f64) {
+fn axes(
+    svg: &mut String,
+    (start, end): (f64, f64),
+    most: f64,
+    x: &impl Fn(f64) -> f64,
+    y: &impl Fn(f64) -> f64,
+) {
     let step = nice(most / 5.0);
     for i in 0..=(most / step) as usize {
         let area = i as f64 * step;

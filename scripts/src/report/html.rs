@@ -187,7 +187,10 @@ fn conditions(body: &mut String, report: &Report) {
     let mut rows: Vec<(&str, String)> = vec![
         (
             "Setting",
-            format!("depth {:.0} mm, focus {:.0} mm, picture {:.0} mm high", of.depth_mm, of.focus_mm, of.window_mm),
+            format!(
+                "depth {:.0} mm, focus {:.0} mm, picture {:.0} mm high",
+                of.depth_mm, of.focus_mm, of.window_mm
+            ),
         ),
         (
             "Calibration",

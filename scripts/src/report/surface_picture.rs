@@ -43,7 +43,12 @@ impl Camera {
         let scale = ((width as f64 - 2.0 * MARGIN) / size.x.max(1e-6))
             .min((height as f64 - 2.0 * MARGIN) / size.y.max(1e-6));
         let centre = axes.transpose() * ((low + high) / 2.0);
-        scale.is_finite().then_some(Self { axes, centre, scale, middle: (width as f64 / 2.0, height as f64 / 2.0) })
+        scale.is_finite().then_some(Self {
+            axes,
+            centre,
+            scale,
+            middle: (width as f64 / 2.0, height as f64 / 2.0),
+        })
     }
 
     /// Column, row and depth (larger is nearer) of a point (mm).
@@ -128,7 +133,8 @@ fn fill(picture: &mut Picture, nearest: &mut [f64], corners: &[Corner; 3], scale
 
 fn bounds(values: [f64; 3], size: usize) -> std::ops::Range<usize> {
     let low = values.iter().copied().fold(f64::INFINITY, f64::min).floor().clamp(0.0, size as f64);
-    let high = (values.iter().copied().fold(f64::NEG_INFINITY, f64::max).ceil() + 1.0).clamp(0.0, size as f64);
+    let high =
+        (values.iter().copied().fold(f64::NEG_INFINITY, f64::max).ceil() + 1.0).clamp(0.0, size as f64);
     low as usize..high as usize
 }
 

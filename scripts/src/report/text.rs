@@ -33,11 +33,21 @@ impl fmt::Display for Report {
 impl Report {
     fn table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let of = &self.exam_of;
-        writeln!(f, "{} leg, study {}: {} stenoses in {:.0} mm", of.side, of.study, self.stenoses.len(), self.measured_mm())?;
+        writeln!(
+            f,
+            "{} leg, study {}: {} stenoses in {:.0} mm",
+            of.side,
+            of.study,
+            self.stenoses.len(),
+            self.measured_mm()
+        )?;
         if self.stenoses.is_empty() {
             return Ok(());
         }
-        writeln!(f, "     segment        area lost  diameter lost  grade      at       length    smallest lumen")?;
+        writeln!(
+            f,
+            "     segment        area lost  diameter lost  grade      at       length    smallest lumen"
+        )?;
         for s in &self.stenoses {
             writeln!(
                 f,
@@ -58,7 +68,8 @@ impl Report {
 
     /// Length of the centreline that was measured (mm).
     fn measured_mm(&self) -> f64 {
-        let seen = || self.area_curve.iter().filter(|point| point.area_mm2.is_some()).map(|point| point.at_mm);
+        let seen =
+            || self.area_curve.iter().filter(|point| point.area_mm2.is_some()).map(|point| point.at_mm);
         seen().fold(0.0, f64::max) - seen().fold(f64::INFINITY, f64::min).min(seen().fold(0.0, f64::max))
     }
 }

@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use probepath_frames::{Direction, Point, Span, World};
-use probepath_robot::{Arm, Guard, GuardLimits, Joints, Model, MotionLimits, Operator, Plane, Workspace, probe_place};
+use probepath_robot::{
+    Arm, Guard, GuardLimits, Joints, Model, MotionLimits, Operator, Plane, Workspace, probe_place,
+};
 use probepath_sim::{CellConfig, SimulatedCell};
 use probepath_us_capture::{BScanSource, Calibration, CalibrationError};
 use serde::{Deserialize, Serialize};
@@ -79,8 +81,11 @@ impl CellFile {
     /// # Errors
     /// When it cannot be read, is no TOML, or has a field that no cell has; the error names the line.
     pub fn read(path: &Path) -> Result<Self, SessionError> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| SessionError::File { doing: "read the cell file", path: path.into(), source })?;
+        let text = std::fs::read_to_string(path).map_err(|source| SessionError::File {
+            doing: "read the cell file",
+            path: path.into(),
+            source,
+        })?;
         Self::parse(&text, &path.display().to_string())
     }
 
@@ -181,7 +186,8 @@ impl Cell {
 
     /// The guard of this cell: joints, forces, and the probe above the table.
     pub(super) fn guard(&self, operator: &Operator) -> Result<Guard, SessionError> {
-        let wrong = |e: probepath_robot::LimitsError| SessionError::Cell { file: "cell".into(), why: e.to_string() };
+        let wrong =
+            |e: probepath_robot::LimitsError| SessionError::Cell { file: "cell".into(), why: e.to_string() };
         let place = probe_place(self.facts.model.clone(), self.facts.flange_from_probe);
         Ok(Guard::new(self.guard_limits(), self.limits)
             .map_err(wrong)?
@@ -222,6 +228,8 @@ fn motion_limits(model: &Model, file: &LimitsFile) -> Result<MotionLimits, Sessi
         limits.upper[i] = joint.upper;
         limits.velocity[i] = joint.velocity * file.velocity_share;
     }
-    limits.check().map_err(|e| SessionError::Cell { file: "the cell's [limits]".into(), why: e.to_string() })?;
+    limits
+        .check()
+        .map_err(|e| SessionError::Cell { file: "the cell's [limits]".into(), why: e.to_string() })?;
     Ok(limits)
 }

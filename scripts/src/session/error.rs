@@ -6,8 +6,8 @@ use probepath_recon::ReconError;
 use probepath_robot::RunError;
 use probepath_sim::CellError;
 use probepath_teach_replay::{GuideError, PathError, PlanError, ReplayError};
-use probepath_us_capture::{BadCalibration, CaptureError};
 use probepath_us_capture::exam::ExamError;
+use probepath_us_capture::{BadCalibration, CaptureError};
 use thiserror::Error;
 
 use crate::report::build::ReportError;

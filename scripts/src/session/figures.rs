@@ -24,7 +24,16 @@ pub(super) struct Figures {
 impl Figures {
     /// Nothing seen yet, of a replay along `curve` at `set_n`.
     pub(super) const fn new(curve: PoseCurve, set_n: f64) -> Self {
-        Self { curve, set_n, followed: 0, force_squares: 0.0, path_squares: 0.0, touch_most_n: 0.0, most_n: 0.0, span: None }
+        Self {
+            curve,
+            set_n,
+            followed: 0,
+            force_squares: 0.0,
+            path_squares: 0.0,
+            touch_most_n: 0.0,
+            most_n: 0.0,
+            span: None,
+        }
     }
 
     /// One tick of the replay.
@@ -51,7 +60,8 @@ impl Figures {
         for _ in 0..4 {
             let point = self.curve.at(at);
             let tangent = point.origin[0];
-            let step = (here - point.base_from_probe.origin().vector()).dot(&tangent) / tangent.norm_squared().max(1e-12);
+            let step = (here - point.base_from_probe.origin().vector()).dot(&tangent)
+                / tangent.norm_squared().max(1e-12);
             at = (at + step).clamp(along - reach, along + reach);
         }
         let point = self.curve.at(at);

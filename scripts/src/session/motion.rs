@@ -1,6 +1,8 @@
 //! One motion of the session: a controller, the one loop, and what its end means.
 
-use probepath_robot::{Arm, BlackBox, Command, Controller, Ending, Guard, Observer, RunError, State, StopReason, run};
+use probepath_robot::{
+    Arm, BlackBox, Command, Controller, Ending, Guard, Observer, RunError, State, StopReason, run,
+};
 
 use super::SessionError;
 

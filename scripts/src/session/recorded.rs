@@ -17,9 +17,9 @@ impl Session {
     /// # Errors
     /// When the exam holds no cell, or rows that are none.
     pub fn open_recorded(exam: &Exam, opening: Opening) -> Result<Self, SessionError> {
-        let cell = exam
-            .attachment(Attachment::CELL)
-            .ok_or(SessionError::Order("the exam holds no cell file: it was not recorded to its beginning"))?;
+        let cell = exam.attachment(Attachment::CELL).ok_or(SessionError::Order(
+            "the exam holds no cell file: it was not recorded to its beginning",
+        ))?;
         let cell = CellFile::parse(cell.text()?, "the exam's cell file")?;
         let seed = exam.header.seed.unwrap_or(opening.seed);
         let mut session = Self::open(Opening { cell, seed, ..opening })?;
@@ -45,7 +45,8 @@ pub fn protocol_of(exam: &Exam) -> Result<Protocol, SessionError> {
 /// One exchange as the arm's trait speaks of it.
 pub(crate) fn row(record: &TickRecord) -> Result<(Command, State), SessionError> {
     let joints = |values: &[f64]| {
-        Joints::from_slice(values).map_err(|_| SessionError::Order("the exam has more joints than any arm here"))
+        Joints::from_slice(values)
+            .map_err(|_| SessionError::Order("the exam has more joints than any arm here"))
     };
     let command = match &record.command {
         None => Command::Stay,

@@ -2,9 +2,9 @@
 
 use probepath_frames::Stamp;
 use probepath_recon::{LumenReconstruction, LumenSettings, SeedPoint, reconstruct_lumen};
-use probepath_robot::motion::timing::PathSpeed;
 use probepath_robot::Operator;
 use probepath_robot::motion::follow::Curve;
+use probepath_robot::motion::timing::PathSpeed;
 use probepath_teach_replay::{
     Path, Plan, PlanSettings, Replay, ReplayEnding, ReplayPhase, ReplaySettings, ReplayStatus,
 };
@@ -190,7 +190,14 @@ impl Session {
         let facts = &self.cell.facts;
         let mut taped = Taped { arm: &mut *self.cell.arm, exam, facts, stand: &stand };
         let machine = &mut *self.cell.machine;
-        let eye = wish.look.then_some(Eye { machine, capture, images, operator: &operator, paused: false, followed: None });
+        let eye = wish.look.then_some(Eye {
+            machine,
+            capture,
+            images,
+            operator: &operator,
+            paused: false,
+            followed: None,
+        });
         let mut recorder = Recorder {
             exam,
             facts,

@@ -34,7 +34,8 @@ pub(super) fn taught_and_scanned(
         progress: Arc::new(()),
     })
     .map_err(wrong)?;
-    let path = session.teach(&TeachWish { study: "VALIDATE".into(), ..TeachWish::default() }).map_err(wrong)?;
+    let path =
+        session.teach(&TeachWish { study: "VALIDATE".into(), ..TeachWish::default() }).map_err(wrong)?;
     let scan = session.scan(&path, wish).map_err(wrong)?;
     Ok(Bench { session, scan })
 }

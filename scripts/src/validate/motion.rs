@@ -97,11 +97,19 @@ pub fn motion(seeds: u64, progress: &dyn Progress) -> Result<Goals, ValidateErro
         let wish = ScanWish { look: false, ..ScanWish::default() };
         let mut bench = taught_and_scanned(&CellFile::default(), seed, &wish, folder.path())?;
         bench.session.close().map_err(|source| ValidateError::Session { seed, source })?;
-        let exam = Exam::open(&bench.session.exam_path()).map_err(|source| ValidateError::Exam { seed, source })?;
+        let exam =
+            Exam::open(&bench.session.exam_path()).map_err(|source| ValidateError::Exam { seed, source })?;
         let limits = *bench.session.motion_limits();
         let found = shares(&exam, &limits).map_err(|source| ValidateError::Session { seed, source })?;
         let same = played_back(&exam, &wish, folder.path());
-        let row = [found.position, found.velocity, found.acceleration, found.jerk, bench.scan.figures.path.rms_error_mm, same];
+        let row = [
+            found.position,
+            found.velocity,
+            found.acceleration,
+            found.jerk,
+            bench.scan.figures.path.rms_error_mm,
+            same,
+        ];
         for (column, value) in columns.iter_mut().zip(row) {
             column.push(value);
         }

@@ -105,7 +105,12 @@ impl Figures {
     fn report(&self, setting: &Row, rows: &mut Vec<Goal>) {
         let goal = setting.name == GOAL;
         let name = setting.name;
-        rows.push(Goal::of(format!("{name}: mean"), &self.mean, goal.then_some(0.40), Some(setting.published)));
+        rows.push(Goal::of(
+            format!("{name}: mean"),
+            &self.mean,
+            goal.then_some(0.40),
+            Some(setting.published),
+        ));
         rows.push(Goal::of(format!("{name}: 95th percentile"), &self.p95, None, None));
         for (values, truth) in self.areas.iter().zip(["80.0", "75.0"]) {
             let figure = format!("{name}: {truth} % area, off by");

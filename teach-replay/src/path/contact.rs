@@ -32,6 +32,11 @@ const REACH: usize = 3;
 const STEEP: f64 = 0.75;
 /// The least descent or lift that counts (m): below it, it is a bump of the skin.
 const LEAST_DROP: f64 = 0.006;
+/// A descent of less than this (m), after the probe went along for at least [`ALONG`], is a hand that presses deeper
+/// into soft skin: from the air it is longer.
+const DEEPER: f64 = 0.02;
+/// (m)
+const ALONG: f64 = 0.01;
 
 /// The stretches of `samples` in contact, in order. `places` are the probe's origins, tremor taken off.
 pub(super) fn stretches(samples: &[Sample], places: &[Vector3<f64>], sign: ContactSign) -> Vec<Range<usize>> {
@@ -73,8 +78,8 @@ fn by_force(samples: &[Sample], on_n: f64, off_n: f64) -> Vec<Range<usize>> {
 /// A motion along the probe's axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Drop {
-    /// Onto the skin; contact begins at this sample.
-    Descent(usize),
+    /// Onto the skin, so far (m); contact begins at this sample.
+    Descent(usize, f64),
     /// Off the skin; contact ends at this sample.
     Lift(usize),
 }
@@ -82,11 +87,15 @@ enum Drop {
 fn by_motion(samples: &[Sample], places: &[Vector3<f64>]) -> Vec<Range<usize>> {
     let drops = drops(samples, places);
     let mut found = Vec::new();
-    let mut since = if matches!(drops.first(), Some(Drop::Descent(_))) { None } else { Some(0) };
-    for drop in drops {
+    let mut since = if matches!(drops.first(), Some(Drop::Descent(..))) { None } else { Some(0) };
+    let mut drops = drops.into_iter().peekable();
+    while let Some(drop) = drops.next() {
         match (drop, since) {
+            (Drop::Descent(at, by), Some(from)) if by < DEEPER && went_along(samples, places, from..at) => {}
             // Down further while already down: the first touch was none.
-            (Drop::Descent(at), _) => since = Some(at),
+            (Drop::Descent(at, _), _) => since = Some(at),
+            // Up once more without coming down in between: the first time the skin let the probe rise.
+            (Drop::Lift(_), Some(_)) if matches!(drops.peek(), Some(Drop::Lift(_))) => {}
             (Drop::Lift(at), Some(from)) => {
                 found.push(from..at.max(from));
                 since = None;
@@ -96,6 +105,14 @@ fn by_motion(samples: &[Sample], places: &[Vector3<f64>]) -> Vec<Range<usize>> {
     }
     found.extend(since.map(|from| from..samples.len()));
     found
+}
+
+/// Whether the probe went along the skin, across its own axis, and not only into it.
+fn went_along(samples: &[Sample], places: &[Vector3<f64>], range: Range<usize>) -> bool {
+    let (Some(from), Some(until)) = (places.get(range.start), places.get(range.end)) else { return false };
+    let axis = samples[range.start].base_from_probe.z_axis().vector();
+    let way = until - from;
+    (way - axis * way.dot(&axis)).norm() >= ALONG
 }
 
 /// Every descent and lift, in order.
@@ -108,8 +125,9 @@ fn drops(samples: &[Sample], places: &[Vector3<f64>]) -> Vec<Drop> {
         let way = slopes[from];
         let until = slopes[from..].iter().position(|s| *s != way).map_or(slopes.len(), |n| from + n);
         let (first, last) = (strides[from], strides[until - 1]);
-        if way != 0 && (places[last] - places[first]).norm() >= LEAST_DROP {
-            found.push(if way > 0 { Drop::Descent(last) } else { Drop::Lift(first) });
+        let by = (places[last] - places[first]).norm();
+        if way != 0 && by >= LEAST_DROP {
+            found.push(if way > 0 { Drop::Descent(last, by) } else { Drop::Lift(first) });
         }
         from = until;
     }
