@@ -1,9 +1,9 @@
 //! Reading the option maps of a protocol: every key is known, every value is of its kind, or the error says which
 //! and shows how it is written.
 
-use rhai::{Array, Dynamic, FLOAT, INT, Map};
+use rhai::{Array, Dynamic, Map};
 
-use crate::quantity::Quantity;
+use crate::quantity::{Quantity, describe};
 
 /// The options of one step, taken out key by key.
 #[derive(Debug)]
@@ -25,16 +25,9 @@ impl Options {
     /// When the value is of another kind, or not finite.
     pub fn quantity<Q: Quantity>(&mut self, key: &'static str) -> Result<Option<Q>, String> {
         let Some(value) = self.take(key) else { return Ok(None) };
-        let found = value.type_name();
-        let shown = value.to_string();
+        let shown = describe(&value);
         value.try_cast::<Q>().map(Some).ok_or_else(|| {
-            format!(
-                "{}: `{key}` is {}, written as {}; found {}",
-                self.step,
-                Q::KIND,
-                Q::EXAMPLE,
-                describe(found, &shown)
-            )
+            format!("{}: `{key}` is {}, written as {}; found {}", self.step, Q::KIND, Q::EXAMPLE, shown)
         })
     }
 
@@ -44,11 +37,8 @@ impl Options {
     /// When the value is no text.
     pub fn text(&mut self, key: &'static str) -> Result<Option<String>, String> {
         let Some(value) = self.take(key) else { return Ok(None) };
-        let shown = value.to_string();
-        value
-            .into_string()
-            .map(Some)
-            .map_err(|found| format!("{}: `{key}` is a text; found {}", self.step, describe(found, &shown)))
+        let shown = describe(&value);
+        value.into_string().map(Some).map_err(|_| format!("{}: `{key}` is a text; found {shown}", self.step))
     }
 
     /// A list, when the key is there.
@@ -57,7 +47,7 @@ impl Options {
     /// When the value is no list.
     pub fn list(&mut self, key: &'static str) -> Result<Option<Array>, String> {
         let Some(value) = self.take(key) else { return Ok(None) };
-        let shown = value.to_string();
+        let shown = describe(&value);
         value.into_array().map(Some).map_err(|_| format!("{}: `{key}` is a list; found {shown}", self.step))
     }
 
@@ -74,11 +64,6 @@ impl Options {
         self.known.push(key);
         self.map.remove(key)
     }
-}
-
-fn describe(type_name: &str, shown: &str) -> String {
-    let bare = type_name == std::any::type_name::<FLOAT>() || type_name == std::any::type_name::<INT>();
-    if bare { format!("{shown}, a bare number without a unit") } else { format!("`{shown}`") }
 }
 
 #[cfg(test)]

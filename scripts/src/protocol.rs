@@ -198,6 +198,10 @@ fn explain(
         EvalAltResult::ErrorFunctionNotFound(signature, _) => {
             ProtocolError::Script { file, place, message: not_found(signature) }
         }
+        EvalAltResult::ErrorStackOverflow(_) => {
+            let message = "functions call each other too deep; does one call itself without end?".into();
+            ProtocolError::Script { file, place, message }
+        }
         EvalAltResult::ErrorRuntime(value, _) => {
             ProtocolError::Script { file, place, message: value.to_string() }
         }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use rhai::{Engine, FLOAT, INT};
+use rhai::{Dynamic, Engine, EvalAltResult, FLOAT, INT};
 
 macro_rules! quantity {
     ($(#[$doc:meta])* $name:ident, $kind:literal, $example:literal, $unit:literal, $per_unit:literal) => {
@@ -103,12 +103,44 @@ fn family<Q: Quantity + PartialOrd>(
     engine.register_fn("/", move |a: Q, x: FLOAT| make(si(a) / x));
     engine.register_fn("/", move |a: Q, x: INT| make(si(a) / x as f64));
     engine.register_fn("/", move |a: Q, b: Q| si(a) / si(b));
+    incomparable::<Q>(engine);
     engine.register_fn("<", |a: Q, b: Q| a < b);
     engine.register_fn("<=", |a: Q, b: Q| a <= b);
     engine.register_fn(">", |a: Q, b: Q| a > b);
     engine.register_fn(">=", |a: Q, b: Q| a >= b);
     engine.register_fn("==", |a: Q, b: Q| a == b);
     engine.register_fn("!=", |a: Q, b: Q| a != b);
+}
+
+/// Rhai takes a comparison of two types that nobody defined for false; here it is an error.
+fn incomparable<Q: Quantity>(engine: &mut Engine) {
+    fn refused<Q: Quantity>(quantity: Q, other: &Dynamic) -> Result<bool, Box<EvalAltResult>> {
+        Err(format!(
+            "{quantity} cannot be compared with {}: give both a unit of the same kind",
+            describe(other)
+        )
+        .into())
+    }
+    for operator in ["<", "<=", ">", ">=", "==", "!="] {
+        engine.register_fn(operator, |a: Q, b: Dynamic| refused(a, &b));
+        engine.register_fn(operator, |a: Dynamic, b: Q| refused(b, &a));
+    }
+}
+
+/// A value as a message shows it: a quantity with its unit, a bare number as what it is.
+pub fn describe(value: &Dynamic) -> String {
+    fn shown<Q: Quantity>(value: &Dynamic) -> Option<String> {
+        value.read_lock::<Q>().map(|quantity| format!("`{}`", *quantity))
+    }
+    if value.is_int() || value.is_float() {
+        return format!("{value}, a bare number without a unit");
+    }
+    shown::<Length>(value)
+        .or_else(|| shown::<Force>(value))
+        .or_else(|| shown::<Speed>(value))
+        .or_else(|| shown::<Angle>(value))
+        .or_else(|| shown::<Duration>(value))
+        .unwrap_or_else(|| format!("`{value}`"))
 }
 
 #[cfg(test)]
@@ -136,6 +168,10 @@ mod tests {
 
     #[test]
     fn a_bare_number_is_not_a_length() {
-        assert!(engine().eval::<bool>("mm(5) > 4").is_err());
+        for comparison in ["mm(5) > 4", "4.0 < mm(5)", "mm(5) == newton(5)", "mm(5) != 5"] {
+            let error = engine().eval::<bool>(comparison).unwrap_err().to_string();
+            assert!(error.contains("cannot be compared"), "{comparison}: {error}");
+        }
+        assert!(engine().eval::<bool>("mm(5) > mm(4)").unwrap());
     }
 }

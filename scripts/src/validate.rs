@@ -13,7 +13,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 pub use force::force;
-pub use motion::motion;
+pub use motion::{Shares, motion, shares};
 pub use table2::table2;
 
 use crate::session::SessionError;

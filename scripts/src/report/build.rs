@@ -7,7 +7,7 @@ use probepath_us_capture::PlacedBScan;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::html::{self, Pictures};
+use super::html::{self, Pictures, Surface};
 use super::picture::Picture;
 use super::surface_picture::{self, Camera, SurfaceView};
 use super::{
@@ -207,9 +207,9 @@ fn area_curve(recon: &LumenReconstruction) -> Vec<AreaPoint> {
 /// The surface and the B-scans at the stenoses; the surface is also left as a file of its own.
 fn pictures(lumen: &Ingredients<'_>, mesh: &Mesh, file: &Path) -> Result<Pictures, ReportError> {
     let mut pictures = Pictures::default();
-    if let Some(surface) = surface_picture(lumen, mesh) {
+    if let Some((surface, labels)) = surface_picture(lumen, mesh) {
         write(file, &surface.png()?)?;
-        pictures.surface = Some(surface.data_uri()?);
+        pictures.surface = Some(Surface { uri: surface.data_uri()?, size: SURFACE_PIXELS, labels });
     }
     for (caption, image, contour) in chosen(lumen) {
         pictures.bscans.push((caption, super::bscan_picture::draw(&image.bscan, contour).data_uri()?));
@@ -217,7 +217,8 @@ fn pictures(lumen: &Ingredients<'_>, mesh: &Mesh, file: &Path) -> Result<Picture
     Ok(pictures)
 }
 
-fn surface_picture(lumen: &Ingredients<'_>, mesh: &Mesh) -> Option<Picture> {
+/// The picture, and the stenoses' names with their places on it.
+fn surface_picture(lumen: &Ingredients<'_>, mesh: &Mesh) -> Option<(Picture, Vec<(String, (f64, f64))>)> {
     let (width, height) = SURFACE_PIXELS;
     let recon = lumen.recon;
     let reference = reference_area(recon)?;
@@ -227,15 +228,17 @@ fn surface_picture(lumen: &Ingredients<'_>, mesh: &Mesh) -> Option<Picture> {
     let view = SurfaceView { vertices_mm: &vertices_mm, triangles: &mesh.triangles, narrowing: &narrowing };
     let camera = Camera::facing(view.vertices_mm, width, height)?;
     let mut picture = surface_picture::render(&view, &camera, width, height);
-    for stenosis in &recon.stenoses {
+    let mut labels = Vec::new();
+    for (index, stenosis) in recon.stenoses.iter().enumerate() {
         let at = recon.centreline.at(stenosis.at_mm * 1e-3)?.point.vector() * 1e3;
         let (x, y, _) = camera.project(at.into());
+        labels.push((format!("S{}", index + 1), (x, y - 82.0)));
         for (from, until) in [((x, y - 74.0), (x, y - 34.0)), ((x, y + 34.0), (x, y + 74.0))] {
             picture.line(from, until, [106, 27, 154]);
             picture.line((from.0 + 1.0, from.1), (until.0 + 1.0, until.1), [106, 27, 154]);
         }
     }
-    Some(picture)
+    Some((picture, labels))
 }
 
 /// The median area stands for the open lumen.

@@ -9,9 +9,20 @@ use super::{Report, StenosisRow};
 #[derive(Clone, Debug, Default)]
 pub struct Pictures {
     /// The lumen surface with the stenoses marked.
-    pub surface: Option<String>,
+    pub surface: Option<Surface>,
     /// B-scans with the contour drawn: what each shows, and the picture.
     pub bscans: Vec<(String, String)>,
+}
+
+/// The surface's picture, and what stands where on it.
+#[derive(Clone, Debug, Default)]
+pub struct Surface {
+    /// The picture, as an address that holds it.
+    pub uri: String,
+    /// Its width and height in pixels.
+    pub size: (usize, usize),
+    /// Names, with the column and row where each is written.
+    pub labels: Vec<(String, (f64, f64))>,
 }
 
 /// Text made safe inside a page.
@@ -36,13 +47,7 @@ pub fn page(report: &Report, pictures: &Pictures) -> String {
     heading(&mut body, report);
     warnings(&mut body, report);
     stenoses(&mut body, &report.stenoses);
-    if let Some(surface) = &pictures.surface {
-        let _ = write!(
-            body,
-            "<figure><img alt='lumen surface' src='{surface}'><figcaption>Lumen surface, proximal end left, seen from \
-             the front; the darker, the narrower.</figcaption></figure>"
-        );
-    }
+    surface(&mut body, pictures.surface.as_ref());
     area(&mut body, report);
     segments(&mut body, report);
     bscans(&mut body, pictures);
@@ -111,7 +116,7 @@ fn stenoses(body: &mut String, rows: &[StenosisRow]) {
     for s in rows {
         let _ = write!(
             body,
-            "<tr><th>{}</th><td>{}</td><td class='n'>{:.1} ± {:.1} %</td><td class='n'>{:.1} %</td><td>{}</td>\
+            "<tr><th>{}</th><td>{}</td><td class='n'>{:.1} ± {:.1} %</td><td class='n'>{:.1} %</td><td class='n'>{}</td>\
              <td class='n'>{:.1} mm</td><td class='n'>{:.1} mm</td><td class='n'>{:.1} mm², {:.1} mm</td>\
              <td>{:.1} mm², {}</td></tr>",
             escape(&s.name),
@@ -129,6 +134,23 @@ fn stenoses(body: &mut String, rows: &[StenosisRow]) {
         );
     }
     body.push_str("</tbody></table>");
+}
+
+fn surface(body: &mut String, surface: Option<&Surface>) {
+    let Some(Surface { uri, size: (width, height), labels }) = surface else { return };
+    let _ = write!(
+        body,
+        "<figure><svg viewBox='0 0 {width} {height}' role='img' aria-label='lumen surface'>\
+         <image width='{width}' height='{height}' href='{uri}'/>"
+    );
+    for (name, (x, y)) in labels {
+        let name = escape(name);
+        let _ = write!(body, "<text class='label' x='{x:.0}' y='{y:.0}' text-anchor='middle'>{name}</text>");
+    }
+    body.push_str(
+        "</svg><figcaption>Lumen surface, proximal end left, seen from the front; the darker, the narrower.\
+         </figcaption></figure>",
+    );
 }
 
 fn area(body: &mut String, report: &Report) {
@@ -250,6 +272,7 @@ h1{font-size:24px;margin:0 0 6px}h2{font-size:16px;margin:28px 0 8px}header p{ma
 .warnings{background:#fff6e0;border-left:4px solid #e0a100;margin:12px 0;padding:10px 10px 10px 28px}\
 table{border-collapse:collapse;width:100%;font-size:14px}\
 th,td{text-align:left;padding:5px 8px;border-bottom:1px solid var(--line);vertical-align:top}\
+td.n{white-space:nowrap}svg text.label{font-size:26px;fill:var(--mark);font-weight:600}\
 thead th{color:var(--soft);font-weight:600}td.n{font-variant-numeric:tabular-nums}\
 .conditions th{width:190px;font-weight:600;color:var(--soft)}.conditions td{overflow-wrap:anywhere}\
 figure{margin:8px 0}img,svg{max-width:100%;height:auto;display:block}figcaption{color:var(--soft);font-size:13px}\

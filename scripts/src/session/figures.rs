@@ -8,6 +8,9 @@ use probepath_robot::motion::follow::{Curve, PoseCurve};
 use super::recorder::Stand;
 use crate::report::ForceFigures;
 
+/// The servo lags by less than this (m).
+const REACH: f64 = 0.002;
+
 /// Sums over the ticks of one replay.
 pub(super) struct Figures {
     curve: PoseCurve,
@@ -55,21 +58,18 @@ impl Figures {
     /// the path the servo's lag is time, not error.
     fn beside(&self, along: f64, base_from_probe: &Pose<Base, Probe>) -> f64 {
         let here = base_from_probe.origin().vector();
-        // The servo lags by a fraction of a millimetre at most, so the nearest point is close to where the path says.
-        let (mut at, reach) = (along, 0.002);
+        let (mut at, mut beside) = (along, 0.0);
         for _ in 0..4 {
             let point = self.curve.at(at);
-            let tangent = point.origin[0];
-            let step = (here - point.base_from_probe.origin().vector()).dot(&tangent)
-                / tangent.norm_squared().max(1e-12);
-            at = (at + step).clamp(along - reach, along + reach);
+            let axis = point.base_from_probe.z_axis().vector();
+            let across = |v: Vector3<f64>| v - axis * v.dot(&axis);
+            let off = across(here - point.base_from_probe.origin().vector());
+            let forward = across(point.origin[0]);
+            let step = off.dot(&forward) / forward.norm_squared().max(1e-12);
+            beside = (off - forward * step).norm();
+            at = (at + step).clamp(along - REACH, along + REACH);
         }
-        let point = self.curve.at(at);
-        let axis: Vector3<f64> = point.base_from_probe.z_axis().vector();
-        let tangent = point.origin[0].normalize();
-        let off = here - point.base_from_probe.origin().vector();
-        let across = off - axis * off.dot(&axis);
-        (across - tangent * across.dot(&tangent)).norm()
+        beside
     }
 
     /// When the path was followed: first and last tick.
