@@ -102,6 +102,22 @@ fn whatever_fails_on_the_way_the_exam_ends_readable_and_the_reason_is_said() {
     }
 }
 
+#[test]
+fn too_much_force_stops_the_scan_and_lifts_the_probe_off() {
+    let out = folder("force-hard");
+    // Hard limit a hair above the soft one, on skin so stiff and bumpy that no law holds it.
+    let cell = format!(
+        "{SHORT_HAND}[simulated.skin]\nsoftest_n_mm = 9.0\nhardest_n_mm = 12.0\n[force]\nsoft_n = 6.0\nhard_n = 6.5\n"
+    );
+    let text = failed(&out, &cell, &format!("{TEACH}scan(path);"));
+    assert!(text.contains("N") && text.contains("force"), "{text}");
+    let exam = Exam::open(&out.join("exam.mcap")).unwrap();
+    let last = exam.ticks.last().unwrap();
+    assert_eq!(last.phase, "lift", "{text}");
+    assert!(last.wrench.force.z.abs() < 1.0, "{last:?}");
+    fs::remove_dir_all(out).unwrap();
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disk_stops_the_arm_and_is_named() {

@@ -163,11 +163,17 @@ impl Progress for At {
 
 #[test]
 fn a_stop_in_the_middle_of_a_scan_leaves_the_arm_at_rest_and_the_exam_readable() {
-    for (step, fraction) in [("teaching", 0.0), ("scanning", 0.0), ("scanning", 0.4)] {
+    // Asked five times a second of exam time: 6 s into the teaching, at the first tick of the replay, on the path.
+    for (step, fraction, asks) in [("teaching", 0.0, 30), ("scanning", 0.0, 0), ("scanning", 0.4, 0)] {
         let out = folder(&format!("stop-{step}-{fraction}"));
         let operator = Operator::new();
         let stopping = operator.clone();
-        let then = Box::new(move || stopping.stop());
+        let asked = std::sync::atomic::AtomicUsize::new(0);
+        let then = Box::new(move || {
+            if asked.fetch_add(1, std::sync::atomic::Ordering::SeqCst) >= asks {
+                stopping.stop();
+            }
+        });
         let error = request(&out, SHORT).run(&operator, Arc::new(At { step, fraction, then })).unwrap_err();
         assert!(error.to_string().contains("stopped by the operator"), "{error}");
         let exam = Exam::open(&out.join("exam.mcap")).unwrap();

@@ -6,7 +6,8 @@ use probepath_robot::Operator;
 use probepath_robot::motion::follow::Curve;
 use probepath_robot::motion::timing::PathSpeed;
 use probepath_teach_replay::{
-    Path, Plan, PlanSettings, Replay, ReplayEnding, ReplayPhase, ReplaySettings, ReplayStatus,
+    LiftOff, Path, Plan, PlanSettings, Replay, ReplayEnding, ReplayError, ReplayPhase, ReplaySettings,
+    ReplayStatus,
 };
 use probepath_us_capture::exam::Attachment;
 use probepath_us_capture::{Capture, Counts, Keeping, PlacedBScan};
@@ -19,6 +20,10 @@ use crate::report::build::{ReportError, ScanFigures};
 
 /// Name of the attachment that keeps what a scan has to say, so that a report can be made again from the exam.
 pub(crate) const SCAN_FIGURES: &str = "scan.json";
+
+/// How far and how fast the probe is lifted off after too much force (m, m/s).
+const LIFT_M: f64 = 0.04;
+const LIFT_M_S: f64 = 0.02;
 
 /// How a path is to be scanned.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -211,11 +216,31 @@ impl Session {
         };
         let done = motion::perform("scanning", &mut taped, &mut replay, &mut self.guard, &mut recorder);
         self.now = recorder.now;
+        if let Err(SessionError::Motion { source, .. }) = &done
+            && source.reason.asks_to_lift()
+        {
+            self.lift()?;
+        }
         done?;
         match watch.status().ending {
             None | Some(ReplayEnding::Completed) => Ok(()),
             Some(other) => Err(SessionError::Ended { step: "scanning", why: other.to_string() }),
         }
+    }
+
+    /// After too much force: the probe comes off the skin along its own axis, and the force may only fall.
+    fn lift(&mut self) -> Result<(), SessionError> {
+        const STEP: &str = "lifting off";
+        let exam = self.exam.as_ref().ok_or(SessionError::Order("the exam was not begun"))?;
+        let stand = || Stand { phase: "lift", along_m: None, fraction: 1.0 };
+        let mut lift = LiftOff::new(self.cell.probe_arm(), LIFT_M, LIFT_M_S).map_err(ReplayError::from)?;
+        let facts = &self.cell.facts;
+        let mut taped = Taped { arm: &mut *self.cell.arm, exam, facts, stand: &stand };
+        let state = motion::ask(STEP, &mut taped)?;
+        self.guard
+            .confirm_to_lift(&state)
+            .map_err(|trip| SessionError::Ended { step: STEP, why: trip.to_string() })?;
+        motion::perform(STEP, &mut taped, &mut lift, &mut self.guard, &mut ())
     }
 
     /// What the capture still held back at the end.
