@@ -1,5 +1,6 @@
 //! The lumen in each B-scan of a sweep: the seed goes from image to image, the wall is fitted in each.
 
+mod again;
 mod beam;
 mod fit;
 mod refusal;
@@ -64,7 +65,7 @@ pub fn segment(images: &[PlacedBScan], settings: &LumenSettings) -> Vec<ImageLum
         look.fitted(image, region, &Plane::ITSELF, None)
     };
     let mut borders: Vec<Result<Border, NoLumen>> = images.par_iter().zip(&regions).map(fit).collect();
-    second_look(images, &look, &mut regions, &mut borders);
+    again::second_look(images, &look, &mut regions, &mut borders);
     for _ in 0..PASSES {
         let planes = beam::planes(images, &borders, &settings.point_spread);
         let inputs = images.par_iter().zip(&regions).zip(&planes);
@@ -88,32 +89,6 @@ pub fn segment(images: &[PlacedBScan], settings: &LumenSettings) -> Vec<ImageLum
     .collect()
 }
 
-/// Looks again at images that were refused between images that were not, where those have the lumen. What is found
-/// there has to show its wall as any other.
-fn second_look(
-    images: &[PlacedBScan],
-    look: &Look<'_>,
-    regions: &mut [Result<Region, NoLumen>],
-    borders: &mut [Result<Border, NoLumen>],
-) {
-    for ((image, border), region) in images.iter().zip(borders.iter_mut()).zip(regions.iter()) {
-        if let (Ok(fitted), Ok(grown)) = (border.as_ref(), region)
-            && let Err(why) = look.accepted(image, fitted, grown)
-        {
-            *border = Err(why);
-        }
-    }
-    let between = track::between(images, borders, &look.settings.point_spread);
-    for (((image, border), region), disc) in images.iter().zip(borders).zip(regions).zip(between) {
-        let dark = matches!(region, Err(NoLumen::Dark { .. }));
-        let Some(disc) = disc.filter(|_| border.is_err() && !dark) else { continue };
-        let Ok(fitted) = look.fitted(image, &disc, &Plane::ITSELF, None) else { continue };
-        if look.accepted(image, &fitted, &disc).is_ok() {
-            (*border, *region) = (Ok(fitted), Ok(disc));
-        }
-    }
-}
-
 /// How often the wall is fitted again with what the neighbouring images say about the beam's thickness.
 const PASSES: usize = 2;
 
@@ -124,6 +99,12 @@ struct Look<'a> {
 }
 
 impl Look<'_> {
+    /// The wall round a region, when it is one of a lumen.
+    fn walled(&self, image: &PlacedBScan, region: &Region) -> Option<Border> {
+        let border = self.fitted(image, region, &Plane::ITSELF, None).ok()?;
+        self.accepted(image, &border, region).is_ok().then_some(border)
+    }
+
     /// The wall, fitted round a region.
     fn fitted(
         &self,

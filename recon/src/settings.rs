@@ -15,8 +15,6 @@ pub struct LumenSettings {
     pub dynamic_range_db: f64,
     /// The point spread that the wall is seen through.
     pub point_spread: PointSpread,
-    /// Read the axial and lateral point spread from the speckle of the images, when they have enough of it.
-    pub point_spread_from_speckle: bool,
     /// Depths under the probe's face between which a lumen is looked for without a seed (m).
     pub depth_range_m: (f64, f64),
     /// Smallest and largest radius of a lumen (m).
@@ -56,8 +54,7 @@ impl Default for LumenSettings {
             seed: None,
             dynamic_range_db: 60.0,
             point_spread: PointSpread::default(),
-            point_spread_from_speckle: true,
-            depth_range_m: (0.010, 0.050),
+            depth_range_m: (0.005, 0.060),
             radius_range_m: (0.0008, 0.0075),
             wall_thickness_m: 0.0008,
             grid: (300, 20),

@@ -4,12 +4,10 @@ use nalgebra::Vector3;
 use probepath_frames::Point;
 use probepath_us_capture::PlacedBScan;
 
-use super::fit::Border;
-use super::region::{RAYS, Region, angle, grow};
+use super::region::{Region, grow};
 use super::{NoLumen, seed};
+use crate::LumenSettings;
 use crate::patch::{Patch, PowerOfGrey};
-use crate::settings::FWHM;
-use crate::{LumenSettings, PointSpread};
 
 /// Half the window the front may fill, over the largest radius.
 const WINDOW: f64 = 1.4;
@@ -17,8 +15,6 @@ const WINDOW: f64 = 1.4;
 const MEMORY_M: f64 = 6e-3;
 /// A vessel not seen for longer than this is looked for anew (m).
 const LOST_M: f64 = 6e-3;
-/// Lumens farther apart than this say little about what lies between (m).
-const BETWEEN_M: f64 = 16e-3;
 /// A picture whose brighter half is darker than this shows no tissue (dB).
 const DARK_DB: f64 = -45.0;
 
@@ -73,7 +69,7 @@ fn region(
 }
 
 /// The region round a seed.
-fn grown(
+pub(crate) fn grown(
     image: &PlacedBScan,
     table: &PowerOfGrey,
     settings: &LumenSettings,
@@ -99,7 +95,7 @@ fn brighter_half_db(image: &PlacedBScan, table: &PowerOfGrey) -> f64 {
 }
 
 /// Where the vessel runs through the image's plane (m, in the image).
-fn predicted(image: &PlacedBScan, trail: &[Vector3<f64>]) -> Option<(f64, f64)> {
+pub(crate) fn predicted(image: &PlacedBScan, trail: &[Vector3<f64>]) -> Option<(f64, f64)> {
     let last = trail.last()?;
     let image_from_world = image.world_from_image.inverse();
     let here = (image_from_world * Point::from_vector(*last)).vector();
@@ -118,57 +114,7 @@ fn predicted(image: &PlacedBScan, trail: &[Vector3<f64>]) -> Option<(f64, f64)> 
 }
 
 /// Whether the last place with a lumen is too far from the plane to say where it is.
-fn far_from_trail(image: &PlacedBScan, trail: &[Vector3<f64>], (x, y): (f64, f64)) -> bool {
+pub(crate) fn far_from_trail(image: &PlacedBScan, trail: &[Vector3<f64>], (x, y): (f64, f64)) -> bool {
     let here = image.world_from_image * Point::new(x, y, 0.0);
     trail.last().is_some_and(|last| (here.vector() - last).norm() > LOST_M)
-}
-
-/// For every image, the lumen that the accepted ones on both sides let expect there; nothing where one side has none
-/// near enough.
-pub(crate) fn between(
-    images: &[PlacedBScan],
-    borders: &[Result<Border, NoLumen>],
-    spread: &PointSpread,
-) -> Vec<Option<Region>> {
-    let seen: Vec<Option<(Vector3<f64>, f64)>> = images
-        .iter()
-        .zip(borders)
-        .map(|(image, border)| {
-            let (area, (x, y)) = super::area_and_centre(&border.as_ref().ok()?.contour());
-            let centre = image.world_from_image * Point::new(x, y, 0.0);
-            Some((centre.vector(), (area / std::f64::consts::PI).sqrt()))
-        })
-        .collect();
-    let expected = |(index, image): (usize, &PlacedBScan)| {
-        let (before, after) = seen.split_at(index);
-        let (a, ra) = (*before.iter().rev().flatten().next()?, *after.iter().skip(1).flatten().next()?);
-        expected(image, spread, a, ra)
-    };
-    images.iter().enumerate().map(expected).collect()
-}
-
-/// The disc that lies in the image's plane between two lumens (centre and radius).
-fn expected(
-    image: &PlacedBScan,
-    spread: &PointSpread,
-    before: (Vector3<f64>, f64),
-    after: (Vector3<f64>, f64),
-) -> Option<Region> {
-    let image_from_world = image.world_from_image.inverse();
-    let local = |place: Vector3<f64>| (image_from_world * Point::from_vector(place)).vector();
-    let (a, b) = (local(before.0), local(after.0));
-    let t = -a.z / (b.z - a.z);
-    if !(0.0..=1.0).contains(&t) || (b - a).norm() > BETWEEN_M {
-        return None;
-    }
-    let (centre, radius) = (a.lerp(&b, t), before.1 + (after.1 - before.1) * t);
-    let setting = &image.bscan.setting;
-    let depth = setting.window_top_m + centre.y;
-    let sigma = (spread.lateral_m(depth, setting) / FWHM, spread.axial_fwhm_m / FWHM);
-    // As far inside as a front would have stopped.
-    let inside = |ray| {
-        let (sin, cos) = angle(ray).sin_cos();
-        (radius - 1.75 * (sigma.0 * cos).hypot(sigma.1 * sin)).max(0.1e-3)
-    };
-    Some(Region { centre: (centre.x, centre.y), radii: (0..RAYS).map(inside).collect(), excess: 1.0 })
 }

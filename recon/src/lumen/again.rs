@@ -1,0 +1,162 @@
+//! A second look at images that were refused: the lumens that were accepted on either side say where to look.
+//!
+//! The first time through, the trail is laid by fronts whose wall nobody has looked at yet; in a tight stenosis it may
+//! go astray into the speckle, and at the beginning of a sweep nothing is known. Here only lumens that show their wall
+//! lead on, forward and backward along the sweep.
+
+use nalgebra::Vector3;
+use probepath_frames::Point;
+use probepath_us_capture::PlacedBScan;
+
+use super::fit::Border;
+use super::region::{RAYS, Region, angle};
+use super::{Look, NoLumen, track};
+use crate::PointSpread;
+use crate::settings::FWHM;
+
+/// Lumens farther apart than this say little about what lies between (m).
+const BETWEEN_M: f64 = 16e-3;
+/// A lumen whose centre lies farther than this from where it was expected is another one (m).
+const ASIDE_M: f64 = 2.5e-3;
+
+/// What each image gave so far.
+type Borders = [Result<Border, NoLumen>];
+
+/// Looks again at images that were refused, where others have the lumen. What is found there has to show its wall as
+/// any other.
+pub(super) fn second_look(
+    images: &[PlacedBScan],
+    look: &Look<'_>,
+    regions: &mut [Result<Region, NoLumen>],
+    borders: &mut Borders,
+) {
+    for ((image, border), region) in images.iter().zip(borders.iter_mut()).zip(regions.iter()) {
+        if let (Ok(fitted), Ok(grown)) = (border.as_ref(), region)
+            && let Err(why) = look.accepted(image, fitted, grown)
+        {
+            *border = Err(why);
+        }
+    }
+    fill_between(images, look, regions, borders);
+    carry_on(0..images.len(), images, look, regions, borders);
+    carry_on((0..images.len()).rev(), images, look, regions, borders);
+}
+
+/// Whether another look may bring something.
+fn open(region: &Result<Region, NoLumen>, border: &Result<Border, NoLumen>) -> bool {
+    border.is_err() && !matches!(region, Err(NoLumen::Dark { .. }))
+}
+
+/// Tries what the accepted lumens on both sides let expect.
+fn fill_between(
+    images: &[PlacedBScan],
+    look: &Look<'_>,
+    regions: &mut [Result<Region, NoLumen>],
+    borders: &mut Borders,
+) {
+    let expected = between(images, borders, &look.settings.point_spread);
+    for (((image, border), region), disc) in images.iter().zip(borders).zip(regions).zip(expected) {
+        let Some(disc) = disc.filter(|_| open(region, border)) else { continue };
+        if let Some(fitted) = look.walled(image, &disc) {
+            (*border, *region) = (Ok(fitted), Ok(disc));
+        }
+    }
+}
+
+/// Goes through the images in an order and carries the lumen on from accepted ones to refused ones.
+fn carry_on(
+    order: impl Iterator<Item = usize>,
+    images: &[PlacedBScan],
+    look: &Look<'_>,
+    regions: &mut [Result<Region, NoLumen>],
+    borders: &mut Borders,
+) {
+    let (mut trail, mut radius) = (Vec::new(), 0.0);
+    for index in order {
+        let (image, region, border) = (&images[index], &mut regions[index], &mut borders[index]);
+        if open(region, border)
+            && let Some((grown, fitted)) = carried(image, look, &trail, radius)
+        {
+            (*region, *border) = (Ok(grown), Ok(fitted));
+        }
+        if let Ok(border) = border {
+            let (centre, own) = seen(image, border);
+            radius = own;
+            trail.push(centre);
+        }
+    }
+}
+
+/// The lumen where the trail leads: as a front finds it, or else as a disc of the size it had.
+fn carried(
+    image: &PlacedBScan,
+    look: &Look<'_>,
+    trail: &[Vector3<f64>],
+    radius: f64,
+) -> Option<(Region, Border)> {
+    let place =
+        track::predicted(image, trail).filter(|place| !track::far_from_trail(image, trail, *place))?;
+    let grown = track::grown(image, look.table, look.settings, place).ok();
+    let disc = disc(image, &look.settings.point_spread, place, radius);
+    grown.into_iter().chain([disc]).find_map(|region| {
+        let border = look.walled(image, &region)?;
+        let (_, centre) = super::area_and_centre(&border.contour());
+        let aside = (centre.0 - place.0).hypot(centre.1 - place.1);
+        (aside < ASIDE_M).then_some((region, border))
+    })
+}
+
+/// Centre in the World and radius (m) of a border.
+fn seen(image: &PlacedBScan, border: &Border) -> (Vector3<f64>, f64) {
+    let (area, (x, y)) = super::area_and_centre(&border.contour());
+    let centre = image.world_from_image * Point::new(x, y, 0.0);
+    (centre.vector(), (area / std::f64::consts::PI).sqrt())
+}
+
+/// For every image, the lumen that the accepted ones on both sides let expect there; nothing where one side has none
+/// near enough.
+fn between(
+    images: &[PlacedBScan],
+    borders: &[Result<Border, NoLumen>],
+    spread: &PointSpread,
+) -> Vec<Option<Region>> {
+    let seen: Vec<Option<(Vector3<f64>, f64)>> =
+        images.iter().zip(borders).map(|(image, border)| Some(seen(image, border.as_ref().ok()?))).collect();
+    let expected = |(index, image): (usize, &PlacedBScan)| {
+        let (before, after) = seen.split_at(index);
+        let (a, ra) = (*before.iter().rev().flatten().next()?, *after.iter().skip(1).flatten().next()?);
+        expected(image, spread, a, ra)
+    };
+    images.iter().enumerate().map(expected).collect()
+}
+
+/// The disc that lies in the image's plane between two lumens (centre and radius).
+fn expected(
+    image: &PlacedBScan,
+    spread: &PointSpread,
+    before: (Vector3<f64>, f64),
+    after: (Vector3<f64>, f64),
+) -> Option<Region> {
+    let image_from_world = image.world_from_image.inverse();
+    let local = |place: Vector3<f64>| (image_from_world * Point::from_vector(place)).vector();
+    let (a, b) = (local(before.0), local(after.0));
+    let t = -a.z / (b.z - a.z);
+    if !(0.0..=1.0).contains(&t) || (b - a).norm() > BETWEEN_M {
+        return None;
+    }
+    let (centre, radius) = (a.lerp(&b, t), before.1 + (after.1 - before.1) * t);
+    Some(disc(image, spread, (centre.x, centre.y), radius))
+}
+
+/// A disc as a front would have filled it.
+fn disc(image: &PlacedBScan, spread: &PointSpread, centre: (f64, f64), radius: f64) -> Region {
+    let setting = &image.bscan.setting;
+    let depth = setting.window_top_m + centre.1;
+    let sigma = (spread.lateral_m(depth, setting) / FWHM, spread.axial_fwhm_m / FWHM);
+    // As far inside as a front would have stopped.
+    let inside = |ray| {
+        let (sin, cos) = angle(ray).sin_cos();
+        (radius - 1.75 * (sigma.0 * cos).hypot(sigma.1 * sin)).max(0.1e-3)
+    };
+    Region { centre, radii: (0..RAYS).map(inside).collect(), excess: 1.0 }
+}
