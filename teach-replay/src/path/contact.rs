@@ -28,10 +28,15 @@ const FORCE_OVER_S: f64 = 0.05;
 const STRIDE: f64 = 0.001;
 /// Strides on either side over which a direction is measured.
 const REACH: usize = 3;
-/// Cosine to the probe's axis beyond which a motion is a descent or a lift.
+/// Cosine to the probe's axis that a descent or a lift reaches somewhere: no skin is so steep under a probe that is
+/// held square to it.
 const STEEP: f64 = 0.75;
-/// The least descent or lift that counts (m): below it, it is a bump of the skin.
-const LEAST_DROP: f64 = 0.006;
+/// Cosine beyond which the strides before and after belong to it: a hand that still goes along rises slowly at first.
+const GENTLE: f64 = 0.4;
+/// The least descent or lift that counts (m along the probe's axis): below it, it is a bump of the skin.
+const LEAST_DROP: f64 = 0.005;
+/// Part of a lift that has to be lost again, however slowly, before the probe is back on the skin.
+const BACK: f64 = 0.6;
 /// A descent of less than this (m), after the probe went along for at least [`ALONG`], is a hand that presses deeper
 /// into soft skin: from the air it is longer.
 const DEEPER: f64 = 0.02;
@@ -75,36 +80,56 @@ fn by_force(samples: &[Sample], on_n: f64, off_n: f64) -> Vec<Range<usize>> {
     found
 }
 
-/// A motion along the probe's axis.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Drop {
-    /// Onto the skin, so far (m); contact begins at this sample.
-    Descent(usize, f64),
-    /// Off the skin; contact ends at this sample.
-    Lift(usize),
+/// A motion along the probe's axis: from one sample to another, so far (m, positive is down).
+#[derive(Clone, Debug, PartialEq)]
+struct Drop {
+    range: Range<usize>,
+    by: f64,
 }
 
+/// The stretches between descents and lifts.
+///
+/// The first descent ends on the skin. A lift ends the contact until the next descent, or until the probe has slowly
+/// come down by most of what it rose; when it rises once more instead, the skin only let it rise the first time. A
+/// further descent before it went along is still the approach, a short one afterwards a hand that presses deeper.
 fn by_motion(samples: &[Sample], places: &[Vector3<f64>]) -> Vec<Range<usize>> {
-    let drops = drops(samples, places);
+    let heights = heights(samples, places);
+    let drops = drops(samples, places, &heights);
     let mut found = Vec::new();
-    let mut since = if matches!(drops.first(), Some(Drop::Descent(..))) { None } else { Some(0) };
-    let mut drops = drops.into_iter().peekable();
+    let mut since = if drops.first().is_some_and(|drop| drop.by > 0.0) { None } else { Some(0) };
+    let mut drops = drops.iter().peekable();
     while let Some(drop) = drops.next() {
-        match (drop, since) {
-            (Drop::Descent(at, by), Some(from)) if by < DEEPER && went_along(samples, places, from..at) => {}
-            // Down further while already down: the first touch was none.
-            (Drop::Descent(at, _), _) => since = Some(at),
-            // Up once more without coming down in between: the first time the skin let the probe rise.
-            (Drop::Lift(_), Some(_)) if matches!(drops.peek(), Some(Drop::Lift(_))) => {}
-            (Drop::Lift(at), Some(from)) => {
-                found.push(from..at.max(from));
-                since = None;
+        let Some(from) = since else {
+            since = (drop.by > 0.0).then_some(drop.range.end);
+            continue;
+        };
+        if drop.by > 0.0 {
+            if drop.by >= DEEPER || !went_along(samples, places, from..drop.range.end) {
+                since = Some(drop.range.end);
             }
-            (Drop::Lift(_), None) => {}
+            continue;
         }
+        let next = drops.peek();
+        let until = next.map_or(samples.len(), |next| next.range.start);
+        let back = comes_back(&heights, &drop.range, until);
+        if back.is_none() && next.is_some_and(|next| next.by < 0.0) {
+            continue;
+        }
+        found.push(from..drop.range.start.max(from));
+        since = back;
     }
     found.extend(since.map(|from| from..samples.len()));
     found
+}
+
+/// Where, before `until`, the probe has slowly come down by most of what it rose since the lift began.
+fn comes_back(heights: &[f64], lift: &Range<usize>, until: usize) -> Option<usize> {
+    let foot = *heights.get(lift.start)?;
+    let mut top = *heights.get(lift.end)?;
+    (lift.end..until).find(|i| {
+        top = top.max(heights[*i]);
+        top - heights[*i] >= BACK * (top - foot)
+    })
 }
 
 /// Whether the probe went along the skin, across its own axis, and not only into it.
@@ -115,21 +140,34 @@ fn went_along(samples: &[Sample], places: &[Vector3<f64>], range: Range<usize>) 
     (way - axis * way.dot(&axis)).norm() >= ALONG
 }
 
-/// Every descent and lift, in order.
-fn drops(samples: &[Sample], places: &[Vector3<f64>]) -> Vec<Drop> {
+/// How high the probe is (m), from wherever it began: what it moved against its own axis, summed.
+fn heights(samples: &[Sample], places: &[Vector3<f64>]) -> Vec<f64> {
+    let mut height = 0.0;
+    let mut last = places.first();
+    let rises = samples.iter().zip(places).map(|(sample, place)| {
+        let way = last.map_or(Vector3::zeros(), |last| place - last);
+        last = Some(place);
+        height -= way.dot(&sample.base_from_probe.z_axis().vector());
+        height
+    });
+    rises.collect()
+}
+
+/// Every descent and lift, in order: strides that go the same way along the axis, one of them steeply.
+fn drops(samples: &[Sample], places: &[Vector3<f64>], heights: &[f64]) -> Vec<Drop> {
     let strides = strides(places);
-    let slopes: Vec<i8> = (0..strides.len()).map(|k| slope(samples, places, &strides, k)).collect();
-    let mut found = Vec::new();
-    let mut from = 0;
-    while from < slopes.len() {
-        let way = slopes[from];
-        let until = slopes[from..].iter().position(|s| *s != way).map_or(slopes.len(), |n| from + n);
-        let (first, last) = (strides[from], strides[until - 1]);
-        let by = (places[last] - places[first]).norm();
-        if way != 0 && by >= LEAST_DROP {
-            found.push(if way > 0 { Drop::Descent(last, by) } else { Drop::Lift(first) });
+    let cosines: Vec<f64> = (0..strides.len()).map(|k| cosine(samples, places, &strides, k)).collect();
+    let way = |cosine: f64| if cosine.abs() < GENTLE { 0.0 } else { cosine.signum() };
+    let (mut found, mut from) = (Vec::new(), 0);
+    while from < cosines.len() {
+        let same = cosines[from..].iter().take_while(|c| way(**c) == way(cosines[from])).count();
+        let run = &cosines[from..from + same];
+        let range = strides[from]..strides[from + same - 1];
+        let by = heights[range.start] - heights[range.end];
+        if way(cosines[from]) != 0.0 && by.abs() >= LEAST_DROP && run.iter().any(|c| c.abs() >= STEEP) {
+            found.push(Drop { range, by });
         }
-        from = until;
+        from += same;
     }
     found
 }
@@ -145,10 +183,10 @@ fn strides(places: &[Vector3<f64>]) -> Vec<usize> {
     kept
 }
 
-/// +1 where the probe goes along its axis, -1 against it, 0 otherwise.
-fn slope(samples: &[Sample], places: &[Vector3<f64>], strides: &[usize], k: usize) -> i8 {
+/// Cosine of the motion around a stride to the probe's axis; none where it hardly moves.
+fn cosine(samples: &[Sample], places: &[Vector3<f64>], strides: &[usize], k: usize) -> f64 {
     let (from, until) = (k.saturating_sub(REACH), (k + REACH).min(strides.len() - 1));
     let way = places[strides[until]] - places[strides[from]];
     let along = way.dot(&samples[strides[k]].base_from_probe.z_axis().vector());
-    if along.abs() < STEEP * way.norm() || way.norm() < STRIDE { 0 } else { along.signum() as i8 }
+    if way.norm() < STRIDE { 0.0 } else { along / way.norm() }
 }

@@ -6,6 +6,11 @@ use nalgebra::Vector3;
 const STRIDE: f64 = 0.001;
 /// Vertices from an end of the line within which a sample is still at the front.
 const FRONT: usize = 3;
+/// Vertices over which the line's heading at an end is measured.
+const HEADING: usize = 10;
+/// Cosine to the heading below which a place is behind the end, not ahead of it: no path on a leg turns by more within
+/// the length of its heading, but a hand that doubles back beside what it did does.
+const BEHIND: f64 = -0.5;
 
 /// A line that grows at whichever end the probe moves on from; coming back along it adds nothing.
 #[derive(Debug, Default)]
@@ -36,15 +41,24 @@ impl Progress {
         };
         let (last, first) = (self.after.len() as i64 - 1, -(self.before.len() as i64));
         let reach = FRONT as i64;
-        if nearest == last && distance >= STRIDE {
+        if nearest == last && distance >= STRIDE && self.is_ahead(last, -1, &place) {
             self.after.push(place);
             self.seen.push((last + 1, true));
-        } else if nearest == first && distance >= STRIDE {
+        } else if nearest == first && distance >= STRIDE && self.is_ahead(first, 1, &place) {
             self.before.push(place);
             self.seen.push((first - 1, true));
         } else {
             self.seen.push((nearest, nearest > last - reach || nearest < first + reach));
         }
+    }
+
+    /// Whether a place beyond the line's end leads on from it; `inward` is the step of index away from that end.
+    fn is_ahead(&self, end: i64, inward: i64, place: &Vector3<f64>) -> bool {
+        let (last, first) = (self.after.len() as i64 - 1, -(self.before.len() as i64));
+        let inside = (end + inward * HEADING as i64).clamp(first, last);
+        let (end, inside) = (self.vertex(end), self.vertex(inside));
+        let (heading, step) = (end - inside, place - end);
+        step.dot(&heading) >= BEHIND * step.norm() * heading.norm()
     }
 
     fn vertex(&self, index: i64) -> Vector3<f64> {
@@ -134,6 +148,21 @@ mod tests {
         let found = along(&xs);
         for (x, s) in xs.iter().zip(&found) {
             assert!(s.is_none_or(|s| (s - (x + 0.0118)).abs() < 1e-3), "{x} {s:?}");
+        }
+    }
+
+    #[test]
+    fn doubling_back_beside_what_was_done_neither_turns_the_line_nor_ends_it() {
+        let there = walk(&[0.0, 0.10]).into_iter().map(|x| Vector3::new(x, 0.0, 0.0));
+        for beside in [0.001, 0.002, 0.004, 0.006] {
+            let aside = walk(&[0.0, beside]).into_iter().map(|y| Vector3::new(0.10, y, 0.0));
+            let back = walk(&[0.10, 0.08, 0.20]).into_iter().map(|x| Vector3::new(x, beside, 0.0));
+            let places: Vec<_> = there.clone().chain(aside).chain(back).collect();
+            let found = Progress::of(places.iter().copied()).along(places.iter().copied());
+            let end = found.last().copied().flatten();
+            assert!(end.is_some_and(|s| (s - 0.20).abs() < 0.006), "{beside}: {end:?}");
+            let most = found.iter().flatten().fold(0.0_f64, |most, s| most.max(*s));
+            assert!((most - 0.20).abs() < 0.006, "{beside}: {most}");
         }
     }
 }

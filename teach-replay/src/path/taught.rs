@@ -21,7 +21,12 @@ struct Hand {
     pause_at: f64,
     back_at: f64,
     back_by: f64,
+    /// How much less it presses while it goes back.
+    back_up: f64,
     lift: bool,
+    lift_up: f64,
+    /// How far it still goes along while it rises.
+    lift_along: f64,
 }
 
 impl Hand {
@@ -46,11 +51,20 @@ impl Hand {
         go(&mut stages, self.pause_at);
         stages.push((self.pause_at, 0.0, 1.0));
         go(&mut stages, self.back_at);
-        go(&mut stages, self.back_at - self.back_by);
+        let back = self.back_at - self.back_by;
+        let ends = [(self.back_at, 0.2), (back, walk(self.back_at, back))];
+        stages.extend(ends.map(|(x, seconds)| (x, self.back_up, seconds)));
+        stages.push((back, 0.0, 0.2));
+        at = back;
+        let mut go = |stages: &mut Vec<(f64, f64, f64)>, to: f64| {
+            stages.push((to, 0.0, walk(at, to)));
+            at = to;
+        };
         go(&mut stages, self.back_at + 0.02);
         if self.lift {
-            let at = self.back_at + 0.02;
-            stages.extend([(at, 0.015, 0.5), (at + 0.015, 0.015, 0.5), (at + 0.015, 0.0, 0.5)]);
+            let (from, at) = (self.back_at + 0.02, self.back_at + 0.02 + self.lift_along);
+            let rise = 0.5 + walk(from, at);
+            stages.extend([(at, self.lift_up, rise), (at, self.lift_up, 0.5), (at, 0.0, 0.5)]);
         }
         go(&mut stages, self.length);
         stages.extend([(self.length, 0.0, 0.3), (self.length, 0.05, 1.5)]);
@@ -105,12 +119,14 @@ fn label() -> Label {
 fn hands() -> impl Strategy<Value = Hand> {
     let shape = (0.12..0.25f64, 0.0..0.01f64, 0.0..0.005f64);
     let tremor = (0.0..0.0005f64, 6.0..12.0f64, 0.0..0.01f64);
-    let habits = (0.008..0.03f64, 0.02..0.04f64, 0.05..0.07f64, 0.003..0.02f64, any::<bool>());
-    (shape, tremor, habits).prop_map(
+    let habits = (0.008..0.03f64, 0.02..0.04f64, 0.05..0.07f64, 0.003..0.02f64, 0.0..0.002f64);
+    let lift = (any::<bool>(), 0.008..0.015f64, 0.0..0.005f64);
+    (shape, tremor, habits, lift).prop_map(
         |(
             (length, bend, hill),
             (tremor_m, tremor_hz, turning),
-            (speed, pause_at, back_at, back_by, lift),
+            (speed, pause_at, back_at, back_by, back_up),
+            (lift, lift_up, lift_along),
         )| Hand {
             length,
             bend,
@@ -122,7 +138,10 @@ fn hands() -> impl Strategy<Value = Hand> {
             pause_at,
             back_at,
             back_by,
+            back_up,
             lift,
+            lift_up,
+            lift_along,
         },
     )
 }
@@ -144,7 +163,7 @@ fn check(hand: &Hand, contact: ContactSign) -> Result<(), TestCaseError> {
     let last = path.points()[path.points().len() - 1].base_from_probe.origin().vector().y + 0.1;
     prop_assert!(first.abs() < 0.004, "begins at {first}");
     prop_assert!((last - hand.length).abs() < 0.004, "ends at {last} of {}", hand.length);
-    prop_assert!((1.2..2.1).contains(&report.approach_s), "{report:?}");
+    prop_assert!((1.2..2.4).contains(&report.approach_s), "{report:?}");
     prop_assert!(report.doubled_back > 0 || hand.back_by < 0.012, "{report:?}");
     for pair in path.points().windows(2) {
         let apart = pair[0].base_from_probe.distance(&pair[1].base_from_probe).0;
@@ -180,7 +199,10 @@ fn steady_hand() -> Hand {
         pause_at: 0.03,
         back_at: 0.06,
         back_by: 0.01,
+        back_up: 0.0,
         lift: false,
+        lift_up: 0.0,
+        lift_along: 0.0,
     }
 }
 
