@@ -157,14 +157,14 @@ fn heights(samples: &[Sample], places: &[Vector3<f64>]) -> Vec<f64> {
 fn drops(samples: &[Sample], places: &[Vector3<f64>], heights: &[f64]) -> Vec<Drop> {
     let strides = strides(places);
     let cosines: Vec<f64> = (0..strides.len()).map(|k| cosine(samples, places, &strides, k)).collect();
-    let way = |cosine: f64| if cosine.abs() < GENTLE { 0.0 } else { cosine.signum() };
+    let way = |cosine: f64| if cosine.abs() < GENTLE { 0 } else { cosine.signum() as i8 };
     let (mut found, mut from) = (Vec::new(), 0);
     while from < cosines.len() {
         let same = cosines[from..].iter().take_while(|c| way(**c) == way(cosines[from])).count();
         let run = &cosines[from..from + same];
         let range = strides[from]..strides[from + same - 1];
         let by = heights[range.start] - heights[range.end];
-        if way(cosines[from]) != 0.0 && by.abs() >= LEAST_DROP && run.iter().any(|c| c.abs() >= STEEP) {
+        if way(cosines[from]) != 0 && by.abs() >= LEAST_DROP && run.iter().any(|c| c.abs() >= STEEP) {
             found.push(Drop { range, by });
         }
         from += same;

@@ -188,7 +188,7 @@ fn a_wish_that_is_no_number_is_a_pause() {
 #[test]
 fn a_speed_follows_a_wish_that_jumps_within_its_bounds_and_a_wish_that_is_no_number_is_rest() {
     let mut ramp = SpeedRamp::at_rest(0.8, 8.0);
-    let wish = |tick: usize| if (tick / 130) % 2 == 0 { 0.1 } else { -0.1 };
+    let wish = |tick: usize| if (tick / 130).is_multiple_of(2) { 0.1 } else { -0.1 };
     let speeds: Vec<f64> = (0..2000).map(|tick| ramp.step(wish(tick), DT)).collect();
     let rates: Vec<f64> = speeds.windows(2).map(|p| (p[1] - p[0]) / DT).collect();
     assert!(speeds.iter().all(|v| v.abs() <= 0.1 + 1e-12) && speeds.iter().any(|v| *v < -0.099));
