@@ -1,7 +1,7 @@
 //! From a header and its payload to a [`Sequence`].
 
 mod axes;
-mod fields;
+pub(super) mod fields;
 
 use super::header::{Format, Header};
 use super::orientation::Orientation;
@@ -140,7 +140,8 @@ fn pictures(
 ) -> Result<Vec<std::sync::Arc<[u8]>>, SequenceError> {
     let claim = axes.claim()?;
     let mut pictures = Vec::new();
-    if claim.block == 0 {
+    // Recorders of poses differ in whether they write the pixels that nobody looks at.
+    if claim.block == 0 || (!axes.has_pictures() && payload.is_empty()) {
         return unpack(
             payload,
             packing_of_nothing(packing, payload),
@@ -150,7 +151,8 @@ fn pictures(
         )
         .map(|()| pictures);
     }
-    unpack(payload, packing, claim, options.most_bytes, |_, block| {
+    let most = most_pixels(claim, options.most_bytes)?;
+    unpack(payload, packing, claim, most, |_, block| {
         if axes.has_pictures() {
             let mut grey = axes::to_grey(block, axes.channels);
             orientation.bring_to_mf(&mut grey, axes.width);
@@ -158,6 +160,16 @@ fn pictures(
         }
     })?;
     Ok(pictures)
+}
+
+/// The limit for the pixels alone: millions of tiny images need more for themselves than for their pixels.
+fn most_pixels(claim: Claim, limit: u64) -> Result<u64, SequenceError> {
+    let an_image = claim.block.saturating_add(size_of::<SequenceImage>() as u64);
+    let needs = claim.count.saturating_mul(an_image);
+    if needs > limit {
+        return Err(SequenceError::TooLarge { needs, limit });
+    }
+    Ok(limit)
 }
 
 /// No pixels need no stream, whatever the header says of its packing.

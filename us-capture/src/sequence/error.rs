@@ -152,6 +152,23 @@ pub enum SequenceError {
         /// Rows of the others.
         height: usize,
     },
+    /// A header could not name its own payload.
+    #[error(
+        "{path}: a .mhd header names its payload in one word without blanks, % and backslashes: rename it, or write .mha",
+        path = path.display()
+    )]
+    DataFileName {
+        /// The payload's file.
+        path: PathBuf,
+    },
+    /// A field of the whole file that would not be read back.
+    #[error("the file's field {field:?} cannot be written: {why}")]
+    UnwritableField {
+        /// The field.
+        field: String,
+        /// What would not be understood.
+        why: &'static str,
+    },
     /// A file name without a known ending.
     #[error("{path}: the ending has to be .mha, .mhd or .nrrd", path = path.display())]
     UnknownEnding {

@@ -1,6 +1,7 @@
 //! The text header that MetaImage and NRRD files begin with. Bytes in, keys and values out: no file is opened, and
 //! nothing is allocated that the bytes do not hold.
 
+use std::collections::HashMap;
 use std::str::FromStr;
 
 use super::SequenceError;
@@ -40,9 +41,25 @@ impl Header {
     /// Reads the header at the start of `bytes`, MetaImage or NRRD by its first line.
     ///
     /// # Errors
-    /// When the first line is of neither, a line has no key, or the header does not end.
+    /// When the first line is of neither, a line has no key, two lines contradict, or the header does not end.
     pub fn parse(bytes: &[u8]) -> Result<Self, SequenceError> {
-        if bytes.starts_with(b"NRRD") { super::nrrd::parse(bytes) } else { super::metaimage::parse(bytes) }
+        let header =
+            if bytes.starts_with(b"NRRD") { super::nrrd::parse } else { super::metaimage::parse }(bytes)?;
+        header.contradictions()?;
+        Ok(header)
+    }
+
+    /// A key that comes twice with two values: programs differ in which one they believe.
+    fn contradictions(&self) -> Result<(), SequenceError> {
+        let mut said: HashMap<&str, &Entry> = HashMap::with_capacity(self.entries.len());
+        for entry in &self.entries {
+            if let Some(before) = said.insert(&entry.key, entry)
+                && before.value != entry.value
+            {
+                return Err(entry.bad(format!("line {} says {:?}", before.line, beginning(&before.value))));
+            }
+        }
+        Ok(())
     }
 
     /// The first entry of that key.
@@ -81,12 +98,7 @@ impl Header {
             None | Some("LOCAL" | "Local" | "local") => return Ok(None),
             Some(name) => name,
         };
-        let plain = !name.is_empty()
-            && !name.contains(['/', '\\', '%', '\0'])
-            && name != "LIST"
-            && name != ".."
-            && name.split_whitespace().count() == 1;
-        if plain {
+        if is_plain(name) {
             return Ok(Some(name));
         }
         Err(SequenceError::Unsupported {
@@ -124,6 +136,12 @@ impl Entry {
             why: why.into(),
         }
     }
+}
+
+/// Whether a name means one file beside the header: MetaImage and NRRD know lists and patterns of files too.
+pub(super) fn is_plain(name: &str) -> bool {
+    let words = name.split_whitespace().count();
+    !name.contains(['/', '\\', '%', '\0']) && name != "LIST" && name != ".." && words == 1
 }
 
 /// Enough of a text to recognise it in a message.

@@ -10,27 +10,27 @@ pub(super) fn parse(text: &str) -> Option<Stamp> {
         Some(rest) => (true, rest),
         None => (false, text),
     };
-    let nanoseconds = match plain(digits) {
-        Some(nanoseconds) => nanoseconds,
-        None => from_double(digits)?,
-    };
-    Some(Stamp::from_nanoseconds(if negative { -nanoseconds } else { nanoseconds }))
+    if !digits.starts_with(|c: char| c.is_ascii_digit() || c == '.') {
+        return None;
+    }
+    let nanoseconds = plain(digits).or_else(|| from_double(digits))?;
+    i64::try_from(if negative { -nanoseconds } else { nanoseconds }).ok().map(Stamp::from_nanoseconds)
 }
 
 /// `whole.fraction`, both of digits only; what is below a nanosecond is cut.
-fn plain(digits: &str) -> Option<i64> {
+fn plain(digits: &str) -> Option<i128> {
     let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
     let all_digits = |text: &str| text.bytes().all(|b| b.is_ascii_digit());
     if whole.is_empty() || !all_digits(whole) || !all_digits(fraction) {
         return None;
     }
     let nine: String = fraction.chars().chain("000000000".chars()).take(9).collect();
-    whole.parse::<i64>().ok()?.checked_mul(1_000_000_000)?.checked_add(nine.parse().ok()?)
+    whole.parse::<i128>().ok()?.checked_mul(1_000_000_000)?.checked_add(nine.parse().ok()?)
 }
 
-fn from_double(text: &str) -> Option<i64> {
+fn from_double(text: &str) -> Option<i128> {
     let seconds: f64 = text.parse().ok()?;
-    (0.0..9.0e9).contains(&seconds).then(|| (seconds * 1e9).round() as i64)
+    (0.0..9.0e9).contains(&seconds).then(|| (seconds * 1e9).round() as i128)
 }
 
 /// Seconds with at least six digits behind the point, as many as the nanoseconds need.
@@ -65,14 +65,14 @@ mod tests {
         ] {
             assert_eq!(parse(printed).map(Stamp::nanoseconds), Some(nanoseconds), "{printed}");
         }
-        for wrong in ["", "nan", "inf", "1.2.3", "-", "--1", "1e99", "99999999999999999999"] {
+        for wrong in ["", "nan", "inf", "1.2.3", "-", "--1", "--0", "-+5", "1e99", "99999999999999999999"] {
             assert_eq!(parse(wrong), None, "{wrong}");
         }
     }
 
     #[test]
     fn what_is_printed_is_read_back() {
-        for nanoseconds in [0, 1, -1, 345_627_957_000, -1_500_000_000, i64::MAX, 1_000] {
+        for nanoseconds in [0, 1, -1, 345_627_957_000, -1_500_000_000, i64::MAX, i64::MIN, 1_000] {
             let stamp = Stamp::from_nanoseconds(nanoseconds);
             assert_eq!(parse(&text(stamp)), Some(stamp));
         }

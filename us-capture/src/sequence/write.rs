@@ -3,12 +3,13 @@
 mod lines;
 
 use std::ffi::OsStr;
-use std::io::Write;
+use std::io::{self, Read, Write};
 use std::path::Path;
 
 use flate2::Compression;
 use flate2::write::{GzEncoder, ZlibEncoder};
 
+use super::header::is_plain;
 use super::{Format, Sequence, SequenceError};
 
 impl Sequence {
@@ -23,12 +24,13 @@ impl Sequence {
             Some("nrrd") => save(path, &self.to_nrrd()?),
             Some("mhd") => {
                 let payload = path.with_extension("zraw");
-                let name =
-                    payload.file_name().and_then(OsStr::to_str).filter(|n| !n.contains(char::is_whitespace));
-                let name = name.ok_or_else(|| SequenceError::UnknownEnding { path: path.into() })?;
+                let name = payload.file_name().and_then(OsStr::to_str);
+                let name = name.filter(|n| is_plain(n) && !n.contains(char::is_whitespace));
+                let name = name.ok_or_else(|| SequenceError::DataFileName { path: payload.clone() })?;
                 let packed = self.packed(Format::MetaImage);
+                let header = lines::metaimage(self, packed.len(), name)?;
                 save(&payload, &packed)?;
-                save(path, lines::metaimage(self, packed.len(), name)?.as_bytes())
+                save(path, header.as_bytes())
             }
             _ => Err(SequenceError::UnknownEnding { path: path.into() }),
         }
@@ -55,6 +57,15 @@ impl Sequence {
         Ok(bytes)
     }
 
+    /// One pixel or none is how recorders write poses without images: such a picture would not be read back.
+    pub(super) fn check_size(&self) -> Result<(), SequenceError> {
+        if !self.has_pictures() || self.width.saturating_mul(self.height) > 1 {
+            return Ok(());
+        }
+        let why = "a picture of one pixel or none is read as no picture";
+        Err(SequenceError::UnwritableField { field: "size of the images".into(), why })
+    }
+
     /// Whether there is anything to see.
     pub(super) fn has_pictures(&self) -> bool {
         self.images.iter().any(|i| i.pixels.is_some())
@@ -78,10 +89,21 @@ impl Sequence {
         }
     }
 
+    /// Images that the header counts: the poses without pictures up to the last number, so that a gap stays one.
+    pub(super) fn count(&self) -> u64 {
+        if self.has_pictures() {
+            return self.images.len() as u64;
+        }
+        self.images.last().map_or(0, |i| i.number.saturating_add(1))
+    }
+
     /// A `Vec` takes every byte, so nothing here can fail.
     fn pour(&self, stream: &mut impl Write) {
-        let block = if self.has_pictures() { self.width * self.height } else { 1 };
-        let black = vec![0; block];
+        if !self.has_pictures() {
+            let _infallible = io::copy(&mut io::repeat(0).take(self.count()), stream);
+            return;
+        }
+        let black = vec![0; self.width * self.height];
         for image in &self.images {
             let _infallible = stream.write_all(image.pixels.as_deref().unwrap_or(&black));
         }

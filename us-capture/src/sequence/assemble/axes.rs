@@ -47,6 +47,9 @@ pub(super) fn of(header: &Header, has_fields: bool, notes: &mut Vec<Note>) -> Re
     let &[width, height] = sizes.as_slice() else {
         return Err(entry.bad("two axes of an image were expected"));
     };
+    if (width == 0) != (height == 0) {
+        return Err(entry.bad("an image without columns or without rows"));
+    }
     let small = |n: u64| usize::try_from(n).map_err(|_| entry.bad("too large"));
     Ok(Axes { channels, width: small(width)?, height: small(height)?, count })
 }

@@ -13,7 +13,7 @@ use crate::sequence::{Note, SequenceError, stamps};
 pub(super) type ImageFields<'h> = BTreeMap<u64, Vec<(&'h str, &'h Entry)>>;
 
 /// Keys of the format itself; everything else is kept as a field of the file.
-const FORMAT_KEYS: [&str; 29] = [
+const FORMAT_KEYS: [&str; 35] = [
     "ObjectType",
     "NDims",
     "AnatomicalOrientation",
@@ -32,6 +32,12 @@ const FORMAT_KEYS: [&str; 29] = [
     "UltrasoundImageOrientation",
     "UltrasoundImageType",
     "ElementDataFile",
+    "data file",
+    "datafile",
+    "line skip",
+    "lineskip",
+    "byte skip",
+    "byteskip",
     "dimension",
     "encoding",
     "endian",
@@ -51,18 +57,24 @@ pub(super) fn split(header: &Header) -> (ImageFields<'_>, Vec<(String, String)>)
     for entry in &header.entries {
         match image_key(&entry.key) {
             Some((number, field)) => images.entry(number).or_default().push((field, entry)),
-            None if FORMAT_KEYS.contains(&entry.key.as_str()) || entry.key == "data file" => (),
+            None if FORMAT_KEYS.contains(&entry.key.as_str()) => (),
             None => rest.push((entry.key.clone(), entry.value.clone())),
         }
     }
     (images, rest)
 }
 
+/// Whether a key means something to the reader, so that no field of the whole file may be called so.
+pub(in crate::sequence) fn is_taken(key: &str) -> bool {
+    FORMAT_KEYS.contains(&key) || image_key(key).is_some()
+}
+
 /// `Seq_Frame0012_Timestamp` is field `Timestamp` of image 12; four digits are a minimum.
 fn image_key(key: &str) -> Option<(u64, &str)> {
     let (number, field) = key.strip_prefix("Seq_Frame")?.split_once('_')?;
-    (number.bytes().all(|b| b.is_ascii_digit()) && !field.is_empty()).then_some(())?;
-    Some((number.parse().ok()?, field))
+    let digits = !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit());
+    // More digits than a number can have lie beyond the last image, which is what is said of them then.
+    (digits && !field.is_empty()).then(|| (number.parse().unwrap_or(u64::MAX), field))
 }
 
 /// One image from its fields.
@@ -90,7 +102,10 @@ pub(super) fn image(
             },
         }
     }
-    image.transforms = tracked(matrices, statuses)?;
+    image.transforms = tracked(matrices, &mut statuses)?;
+    // What is said of a pose that is not there stays as it stood.
+    let left = statuses.into_iter().map(|(name, status)| (format!("{name}TransformStatus"), status));
+    image.fields.extend(left.map(|(field, status)| (field, status.word().unwrap_or_default().into())));
     Ok(image)
 }
 
@@ -105,7 +120,7 @@ fn plain(image: &mut SequenceImage, field: &str, entry: &Entry, notes: &mut Vec<
 
 fn tracked(
     matrices: BTreeMap<TransformName, &Entry>,
-    mut statuses: BTreeMap<TransformName, Status>,
+    statuses: &mut BTreeMap<TransformName, Status>,
 ) -> Result<BTreeMap<TransformName, Tracked>, SequenceError> {
     let mut transforms = BTreeMap::new();
     for (name, entry) in matrices {
