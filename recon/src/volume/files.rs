@@ -131,22 +131,32 @@ fn grid(header: &Header) -> Result<Grid, SequenceError> {
 }
 
 fn metaimage_grid(header: &Header) -> Result<Grid, SequenceError> {
+    header.need("ElementType")?;
     expect(header, "ElementType", &["MET_UCHAR"], "only 8 bits without sign are")?;
     expect(header, "ElementNumberOfChannels", &["1"], "only grey levels are")?;
-    if let Some(entry) = header.entry("TransformMatrix")
-        && entry.finite_numbers()? != [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
-    {
-        return Err(entry.bad("a turned volume is not supported"));
+    // Of these MetaImage knows three names each.
+    for key in ["TransformMatrix", "Rotation", "Orientation"] {
+        if let Some(entry) = header.entry(key)
+            && entry.finite_numbers()? != [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+        {
+            return Err(entry.bad("a turned volume is not supported"));
+        }
     }
-    let three = |key| header.entry(key).map(|e| three(e, e.finite_numbers()?)).transpose();
-    let spacing = three("ElementSpacing")?.unwrap_or([1.0; 3]);
-    let origin = three("Offset")?.or(three("Position")?).unwrap_or([0.0; 3]);
+    let origin = ["Position", "Origin"].into_iter().find_map(|key| header.entry(key));
+    let origin = origin.map_or_else(|| header.need("Offset"), Ok)?;
+    let spacing = header.need("ElementSpacing")?;
+    let (spacing, origin) =
+        (three(spacing, spacing.finite_numbers()?)?, three(origin, origin.finite_numbers()?)?);
     assembled(header.need("DimSize")?, header.words("Kinds").last().copied(), spacing, origin)
 }
 
 fn nrrd_grid(header: &Header) -> Result<Grid, SequenceError> {
+    header.need("type")?;
     expect(header, "type", &["uint8", "uchar", "unsigned char", "uint8_t"], "only 8 bits without sign are")?;
+    header.need("space")?;
     expect(header, "space", &["left-posterior-superior", "LPS"], "only left-posterior-superior is")?;
+    let mm = r#""mm" "mm" "mm""#;
+    expect(header, "space units", &[mm], "only millimetres are")?;
     let directions = header.need("space directions")?;
     let numbers = parenthesised(directions)?;
     let &[sx, 0.0, 0.0, 0.0, sy, 0.0, 0.0, 0.0, sz] = numbers.as_slice() else {
@@ -176,7 +186,7 @@ fn assembled(
     Ok(Grid { origin, spacing_m: spacing_mm.map(|s| s * 1e-3), size: [nx, ny, nz] })
 }
 
-/// Refuses another value than these; an absent key is the first.
+/// Refuses another value than these; an absent key is none.
 fn expect(header: &Header, key: &str, known: &[&str], why: &'static str) -> Result<(), SequenceError> {
     match header.get(key) {
         Some(value) if !known.contains(&value) => {
