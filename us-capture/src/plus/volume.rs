@@ -3,7 +3,7 @@
 use roxmltree::Node;
 
 use super::PlusError;
-use super::xml::{bad, missing, numbers};
+use super::xml::{bad, finite, missing, numbers};
 
 /// How PLUS builds a volume.
 #[derive(Clone, Debug, PartialEq)]
@@ -90,7 +90,7 @@ pub(super) fn parse(node: Node<'_, '_>) -> Result<PlusVolume, PlusError> {
 }
 
 fn spacing(node: Node<'_, '_>) -> Result<[f64; 3], PlusError> {
-    let spacing = numbers::<f64>(node, "OutputSpacing", 3)?.ok_or_else(|| missing(node, "OutputSpacing"))?;
+    let spacing = finite(node, "OutputSpacing", 3)?.ok_or_else(|| missing(node, "OutputSpacing"))?;
     match spacing.as_slice() {
         &[x, y, z] if [x, y, z].iter().all(|s| s.is_finite() && *s > 0.0) => Ok([x, y, z]),
         _ => Err(bad(node, "OutputSpacing", "a voxel has a positive size (mm)")),
@@ -129,8 +129,8 @@ fn clip(node: Node<'_, '_>) -> Result<Option<Rectangle>, PlusError> {
 }
 
 fn fan(node: Node<'_, '_>) -> Result<Option<Fan>, PlusError> {
-    let angles = numbers::<f64>(node, "FanAnglesDeg", 2)?.or(numbers::<f64>(node, "FanAngles", 2)?);
-    let origin = numbers::<f64>(node, "FanOriginPixel", 2)?.or(numbers::<f64>(node, "FanOrigin", 2)?);
+    let angles = finite(node, "FanAnglesDeg", 2)?.or(finite(node, "FanAngles", 2)?);
+    let origin = finite(node, "FanOriginPixel", 2)?.or(finite(node, "FanOrigin", 2)?);
     let (Some(&[first, last]), Some(&[x, y])) = (angles.as_deref(), origin.as_deref()) else {
         return Ok(None);
     };
@@ -142,8 +142,8 @@ fn fan(node: Node<'_, '_>) -> Result<Option<Fan>, PlusError> {
             Err(bad(node, "FanAnglesDeg", "between -90 and 90 degrees"))
         };
     }
-    let start = numbers::<f64>(node, "FanRadiusStartPixel", 1)?;
-    let stop = numbers::<f64>(node, "FanRadiusStopPixel", 1)?.or(numbers::<f64>(node, "FanDepth", 1)?);
+    let start = finite(node, "FanRadiusStartPixel", 1)?;
+    let stop = finite(node, "FanRadiusStopPixel", 1)?.or(finite(node, "FanDepth", 1)?);
     let radius_px = match (start.as_deref(), stop.as_deref()) {
         (start, Some(&[stop])) => {
             Some(FanArc { start: start.and_then(|s| s.first()).copied().unwrap_or(0.0), stop })

@@ -15,10 +15,7 @@ pub(super) fn transforms(root: Node<'_, '_>) -> Result<Vec<PlusTransform>, PlusE
 }
 
 fn transform(node: Node<'_, '_>) -> Result<PlusTransform, PlusError> {
-    let numbers = numbers::<f64>(node, "Matrix", 16)?.ok_or_else(|| missing(node, "Matrix"))?;
-    if numbers.iter().any(|x| !x.is_finite()) {
-        return Err(bad(node, "Matrix", "a number is not finite"));
-    }
+    let numbers = finite(node, "Matrix", 16)?.ok_or_else(|| missing(node, "Matrix"))?;
     let word = |name| node.attribute(name).map(str::to_owned).ok_or_else(|| missing(node, name));
     Ok(PlusTransform {
         from: word("From")?,
@@ -44,6 +41,20 @@ pub(super) fn numbers<T: FromStr>(
         return Err(bad(node, name, format!("{count} numbers were expected, {} came", numbers.len())));
     }
     Ok(Some(numbers))
+}
+
+/// So many finite numbers in one attribute: `nan` and `1e400` are read as numbers too.
+pub(super) fn finite(
+    node: Node<'_, '_>,
+    name: &'static str,
+    count: usize,
+) -> Result<Option<Vec<f64>>, PlusError> {
+    match numbers::<f64>(node, name, count)? {
+        Some(numbers) if numbers.iter().any(|x| !x.is_finite()) => {
+            Err(bad(node, name, "a number is not finite"))
+        }
+        numbers => Ok(numbers),
+    }
 }
 
 pub(super) fn missing(node: Node<'_, '_>, attribute: &'static str) -> PlusError {

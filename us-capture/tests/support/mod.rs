@@ -1,5 +1,7 @@
 //! Random sequences, seeded.
 
+#![expect(clippy::expect_used, reason = "a test may stop at the first surprise")]
+
 use std::collections::BTreeMap;
 
 use nalgebra::Matrix4;
