@@ -6,8 +6,11 @@ mod support;
 
 use std::time::{Duration, Instant};
 
+use nalgebra::Vector3;
+use probepath_frames::{Point, Probe, Span, Stamp};
 use probepath_us_capture::plus::PlusConfig;
-use probepath_us_capture::sequence::{Header, ReadOptions, Sequence, SequenceError};
+use probepath_us_capture::sequence::{Header, Placing, ReadOptions, Sequence, SequenceError, SequenceSource};
+use probepath_us_capture::{BScanSource, PixelMap, PixelSpacing};
 use proptest::prelude::*;
 use proptest::sample::Index;
 use support::{pictures, poses, seeded};
@@ -115,6 +118,25 @@ fn damaged(mut bytes: Vec<u8>, damage: &Damage) -> Vec<u8> {
     bytes
 }
 
+/// What numbers that only look right do to those who use them: poses, stamps at the ends of time.
+fn use_it(sequence: &Sequence) {
+    let map = PixelMap::<Probe>::new(Point::new(0.0, 0.0, 0.0), Vector3::x() * 1e-4, Vector3::y() * 1e-4);
+    for lag in [Span::ZERO, Span::from_milliseconds(-60)] {
+        let placing = Placing { reference: "Tracker".into(), lag, ..Placing::new(map) };
+        if let Ok(placed) = sequence.place(&placing) {
+            let skipped: usize = placed.skipped.values().sum();
+            assert_eq!(placed.images.len() + skipped, sequence.images().len());
+        }
+    }
+    let spacing = PixelSpacing { x_m: 1e-4, y_m: 1e-4 };
+    let mut source = SequenceSource::new(sequence, spacing, Stamp::ZERO);
+    let mut shown = 0;
+    while let Ok(Some(_)) = source.poll(Stamp::from_nanoseconds(i64::MAX)) {
+        shown += 1;
+    }
+    assert_eq!(shown + source.skipped(), sequence.images().len() as u64);
+}
+
 fn read(bytes: &[u8]) -> Result<Sequence, SequenceError> {
     let header = Header::parse(bytes)?;
     let _named = header.data_file()?;
@@ -142,6 +164,7 @@ proptest! {
                 let size = read.width() * read.height();
                 prop_assert!(read.images().iter().all(|i| i.pixels.as_ref().is_none_or(|p| p.len() == size)));
                 prop_assert!(read.images().len() < 1 << 15);
+                use_it(&read);
             }
         }
         check_memory();
