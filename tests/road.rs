@@ -57,11 +57,25 @@ fn one_scan_leaves_report_surface_and_an_exam_that_keeps_every_promise() {
     let exam = Exam::open(&out.join("exam.mcap")).unwrap();
     assert_eq!(exam.ending, Ending::Complete);
     assert_eq!(exam.bscans.len(), report.images.kept);
+    strangers_read_the_surfaces(&out);
     within_limits(&exam, &out);
     the_same_again(&out);
     played_back(&exam, &out);
     reconstructed_again(&out, &report);
     fs::remove_dir_all(out).unwrap();
+}
+
+/// trimesh and VTK find the three surfaces closed, facing outward and equal.
+fn strangers_read_the_surfaces(out: &Path) {
+    let Some(python) = std::env::var_os("PROBEPATH_PYTHON") else {
+        eprintln!("skipped: PROBEPATH_PYTHON names no Python with trimesh and vtk (tests/run installs one)");
+        return;
+    };
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/interop/meshes.py");
+    let surfaces = ["lumen.stl", "lumen.ply", "lumen.vtp"].map(|name| out.join(name));
+    let done = std::process::Command::new(python).arg(script).args(surfaces).output().unwrap();
+    let said = format!("{}{}", String::from_utf8_lossy(&done.stdout), String::from_utf8_lossy(&done.stderr));
+    assert!(done.status.success(), "{said}");
 }
 
 /// Every command of the exam, by finite differences, within the limits of its cell.
