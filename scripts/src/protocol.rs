@@ -76,7 +76,7 @@ pub enum ProtocolError {
         /// Line and column.
         place: Place,
         /// Why.
-        source: SessionError,
+        source: Box<SessionError>,
     },
     /// The script computes without end.
     #[error(
@@ -186,7 +186,7 @@ fn explain(
         return if operator.wish() == Asked::Stop && source.is_stop() {
             ProtocolError::Stopped { file }
         } else {
-            ProtocolError::Step { file, place, source }
+            ProtocolError::Step { file, place, source: Box::new(source) }
         };
     }
     match innermost(error) {

@@ -45,7 +45,7 @@ pub enum ScanError {
     #[error("{source}\nThe arm is at rest. {kept}")]
     Ended {
         /// Why.
-        source: ProtocolError,
+        source: Box<ProtocolError>,
         /// What is left of it.
         kept: String,
     },
@@ -88,7 +88,7 @@ impl ScanRequest {
                     format!("The exam is readable as far as it was written ({error}): {}.", exam.display())
                 }
             };
-            return Err(ScanError::Ended { source, kept });
+            return Err(ScanError::Ended { source: Box::new(source), kept });
         }
         closed?;
         let nothing = || Report { exam: exam.display().to_string(), ..Report::default() };

@@ -84,6 +84,9 @@ pub enum ReportError {
     Json(#[from] serde_json::Error),
 }
 
+/// Names, with the column and row where each is written.
+type Labels = Vec<(String, (f64, f64))>;
+
 /// Size of the surface's picture.
 const SURFACE_PIXELS: (usize, usize) = (1680, 420);
 /// At most so many B-scans in a report.
@@ -218,7 +221,7 @@ fn pictures(lumen: &Ingredients<'_>, mesh: &Mesh, file: &Path) -> Result<Picture
 }
 
 /// The picture, and the stenoses' names with their places on it.
-fn surface_picture(lumen: &Ingredients<'_>, mesh: &Mesh) -> Option<(Picture, Vec<(String, (f64, f64))>)> {
+fn surface_picture(lumen: &Ingredients<'_>, mesh: &Mesh) -> Option<(Picture, Labels)> {
     let (width, height) = SURFACE_PIXELS;
     let recon = lumen.recon;
     let reference = reference_area(recon)?;
@@ -258,7 +261,10 @@ fn area_near(recon: &LumenReconstruction, vertex: &nalgebra::Vector3<f64>) -> f6
         .map_or(0.0, |(_, area)| area)
 }
 
-type Chosen<'a> = (String, &'a PlacedBScan, Option<&'a [(f64, f64)]>);
+/// The contour in a B-scan's pixels (column, row), where a lumen was seen.
+type Contour<'a> = Option<&'a [(f64, f64)]>;
+/// What a B-scan shows, the B-scan, and its contour.
+type Chosen<'a> = (String, &'a PlacedBScan, Contour<'a>);
 
 /// The B-scan nearest to each stenosis and, before them, one of open lumen.
 fn chosen<'a>(lumen: &Ingredients<'a>) -> Vec<Chosen<'a>> {
@@ -281,7 +287,7 @@ fn chosen<'a>(lumen: &Ingredients<'a>) -> Vec<Chosen<'a>> {
         .collect()
 }
 
-fn nearest<'a>(lumen: &Ingredients<'a>, at_mm: f64) -> Option<(&'a PlacedBScan, Option<&'a [(f64, f64)]>)> {
+fn nearest<'a>(lumen: &Ingredients<'a>, at_mm: f64) -> Option<(&'a PlacedBScan, Contour<'a>)> {
     let place = lumen.recon.centreline.at(at_mm * 1e-3)?.point;
     lumen
         .recon
