@@ -84,6 +84,9 @@ pub enum ReplayError {
     Law(#[from] ContactError),
 }
 
+/// Time constant with which the ramp of the force ends (s).
+const EASED_OVER_S: f64 = 0.4;
+
 /// Where a replay is.
 #[derive(Clone, Copy, Debug)]
 enum Stage {
@@ -201,8 +204,7 @@ impl Replay {
     /// The force is raised until it holds.
     fn settle(&mut self, state: &State, set_n: f64, ticks: u32, steady: u32, pause: bool) -> Option<Joints> {
         let pressing = self.pressing(state);
-        let rise = if pause { 0.0 } else { self.settings.ramp_n_s * self.dt };
-        let set_n = (set_n + rise).min(self.settings.force_n);
+        let set_n = if pause { set_n } else { self.raised(set_n) };
         self.law.step(pressing, set_n);
         let missing = (self.settings.force_n - self.law.force_n()).abs();
         let steady = if missing < 0.1 * self.settings.force_n { steady + 1 } else { 0 };
@@ -217,6 +219,14 @@ impl Replay {
             Stage::Settle { set_n, ticks: if pause { ticks } else { ticks + 1 }, steady }
         };
         self.on_path()
+    }
+
+    /// The force to hold a tick later: it rises at the ramp's rate, and ever slower toward the end, so that the speed
+    /// which the law built up on soft skin is gone when the force is there.
+    fn raised(&self, set_n: f64) -> f64 {
+        let left = self.settings.force_n - set_n;
+        let rate = self.settings.ramp_n_s.min(left / EASED_OVER_S);
+        set_n + rate * self.dt
     }
 
     /// Along the path, the force held.
