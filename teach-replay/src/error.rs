@@ -78,6 +78,17 @@ pub enum PathError {
         /// The shortest allowed (mm).
         least_mm: f64,
     },
+    /// The probe came back beside its own path: what it did there would be lost.
+    #[error(
+        "{length_mm:.0} mm on the skin went back beside what was already taught, up to {away_mm:.0} mm from it: \
+         a path does not come back beside itself; teach the two ways as two paths"
+    )]
+    ComesBack {
+        /// How far it went there (mm).
+        length_mm: f64,
+        /// How far from the path it was (mm).
+        away_mm: f64,
+    },
     /// The hand was too unsteady to be smoothed honestly.
     #[error(
         "smoothing would move the path by {moved_mm:.1} mm at {at_mm:.0} mm along it, more than {most_mm:.1} mm: \

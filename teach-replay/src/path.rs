@@ -1,5 +1,6 @@
 //! [`Path`]: what was taught, cleaned: poses at uniform spacing along the skin.
 
+mod beside;
 mod clean;
 mod contact;
 mod file;

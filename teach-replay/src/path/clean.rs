@@ -7,6 +7,7 @@ use probepath_frames::Pose;
 use probepath_robot::motion::follow::CurveError;
 use probepath_robot::motion::spline::Spline;
 
+use super::beside::Beside;
 use super::contact::{ContactSign, stretches};
 use super::progress::Progress;
 use super::resample::uniform;
@@ -103,6 +104,8 @@ pub struct CleaningReport {
     pub pauses_s: f64,
     /// States in contact that went over what was already done.
     pub doubled_back: usize,
+    /// Way on the skin that went back beside what was already done, more than 4 mm from it, and was left out (m).
+    pub beside: f64,
     /// Stretches off the skin that were bridged.
     pub bridges: Vec<Bridge>,
     /// How far smoothing moved the points across the path: RMS and largest (m).
@@ -194,6 +197,7 @@ struct Contact<'a> {
     kept: Vec<usize>,
     along: Vec<Option<f64>>,
     pauses_s: f64,
+    beside: Beside,
 }
 
 impl<'a> Contact<'a> {
@@ -211,7 +215,10 @@ impl<'a> Contact<'a> {
         let along = progress.along(kept.iter().map(|i| place(&samples[*i])));
         let pauses_s =
             stretches.iter().map(|range| pauses(&samples[range.clone()], &steady[range.clone()])).sum();
-        Ok(Self { samples, stretches, kept, along, pauses_s })
+        let places = kept.iter().map(|i| (&samples[*i], steady[*i]));
+        let beside = Beside::of(places.zip(progress.doubled()));
+        beside.check()?;
+        Ok(Self { samples, stretches, kept, along, pauses_s, beside })
     }
 
     fn used(&self) -> impl Iterator<Item = (&Sample, f64)> {
@@ -266,6 +273,7 @@ impl<'a> Contact<'a> {
             lift_off_s: seconds(last.saturating_sub(1), self.samples.len() - 1),
             pauses_s: self.pauses_s,
             doubled_back: self.kept.len() - used,
+            beside: self.beside.length,
             bridges,
             moved_rms: (squares / moved.len().max(1) as f64).sqrt(),
             moved_most: moved.iter().fold(0.0, |most, (m, _)| most.max(*m)),

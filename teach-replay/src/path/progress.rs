@@ -74,6 +74,11 @@ impl Progress {
             .map(|(i, squared)| (i, squared.sqrt()))
     }
 
+    /// For each place given to [`Self::of`], the nearest of the line when the hand was going back over it.
+    pub(super) fn doubled(&self) -> impl Iterator<Item = Option<Vector3<f64>>> {
+        self.seen.iter().map(|(index, front)| (!front).then(|| self.vertex(*index)))
+    }
+
     /// The line in the order of the main direction of travel, and for each of `places` (as given to [`Self::of`])
     /// how far along it is (m), or `None` where the hand was going back over what it had already done.
     pub(super) fn along(&self, places: impl Iterator<Item = Vector3<f64>>) -> Vec<Option<f64>> {

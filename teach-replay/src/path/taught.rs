@@ -248,3 +248,55 @@ fn the_same_recording_gives_the_same_path_to_the_bit() {
     let clean = || Path::clean(&samples, label(), &Cleaning::default()).unwrap();
     assert_eq!(clean(), clean());
 }
+
+/// Down, 80 mm along y, `apart` across, 80 mm back, and up, at 15 mm/s.
+fn there_and_back(apart: f64) -> Vec<Sample> {
+    let corners = [
+        Vector3::new(0.0, 0.0, 0.05),
+        Vector3::zeros(),
+        Vector3::new(0.0, 0.08, 0.0),
+        Vector3::new(apart, 0.08, 0.0),
+        Vector3::new(apart, 0.0, 0.0),
+        Vector3::new(apart, 0.0, 0.05),
+    ];
+    let mut samples = Vec::new();
+    for pair in corners.windows(2) {
+        let ticks = ((pair[1] - pair[0]).norm() / 0.015 * 500.0).ceil();
+        for i in 0..ticks as usize {
+            let origin = pair[0] + (pair[1] - pair[0]) * (i as f64 / ticks) + Vector3::new(0.4, 0.1, 0.1);
+            let turn = Vector3::new(std::f64::consts::PI, 0.0, 0.0);
+            samples.push(Sample {
+                stamp: Stamp::ZERO + Span::from_milliseconds(2 * samples.len() as i64),
+                // FRAMES: a made-up probe in a made-up base, its face down.
+                base_from_probe: Pose::assume(Isometry3::new(origin, turn)),
+                wrench: Wrench::zero(),
+                guiding: true,
+            });
+        }
+    }
+    samples
+}
+
+#[test]
+fn a_way_back_beside_the_path_is_kept_or_refused_but_never_lost_silently() {
+    let mut refused = 0;
+    for apart_mm in 1..=30 {
+        let apart = (f64::from(apart_mm) + 0.5) * 1e-3;
+        match Path::clean(&there_and_back(apart), label(), &Cleaning::default()) {
+            // Nearer than a hand keeps its line it is doubling back.
+            Ok((path, report)) if apart_mm < 4 => {
+                assert!(
+                    path.length() > 0.07 && path.length() < 0.09 && report.doubled_back > 0,
+                    "{report:?}"
+                );
+            }
+            Ok((path, report)) => assert!(path.length() > 0.15, "{apart_mm} mm: {report:?}"),
+            Err(PathError::ComesBack { length_mm, .. }) => {
+                assert!(length_mm > 40.0 && apart_mm >= 4, "{apart_mm} mm: {length_mm}");
+                refused += 1;
+            }
+            Err(other) => panic!("{apart_mm} mm: {other}"),
+        }
+    }
+    eprintln!("{refused} of 30 refused");
+}
