@@ -325,3 +325,25 @@ fn keys_that_contradict_each_other_are_refused() {
     assert!(matches!(refused, Err(SequenceError::BadValue { line: 7, .. })), "{refused:?}");
     assert!(read(&usual(&[MF, MF])).is_ok(), "the same thing said twice is one thing");
 }
+
+#[test]
+fn a_payload_beside_its_header_is_read_and_one_elsewhere_is_refused() {
+    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("sequence-traps");
+    std::fs::create_dir_all(&folder).unwrap();
+    std::fs::write(folder.join("a.raw"), PIXELS).unwrap();
+    let meta = String::from_utf8(usual(&[MF])[..usual(&[MF]).len() - PIXELS.len()].to_vec()).unwrap();
+    let nrrd = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 3 2 2\nkinds: domain domain list\nencoding: raw\n\
+                ultrasound image orientation:=MF\ndata file: LOCAL\n";
+    let from = |file: &str, header: &str, name: &str| {
+        std::fs::write(folder.join(file), header.replace("LOCAL", name)).unwrap();
+        Sequence::read(&folder.join(file), &ReadOptions::default())
+    };
+    for (file, header) in [("a.mhd", &meta[..]), ("a.nhdr", nrrd)] {
+        assert_eq!(pixels(&from(file, header, "a.raw").unwrap()), PIXELS, "{file}");
+        for name in ["../a.raw", "/etc/hostname", "..", "LIST", "a%03d.raw 1 10 1", "b\\a.raw"] {
+            let refused = from(file, header, name);
+            assert!(matches!(refused, Err(SequenceError::Unsupported { .. })), "{file} {name}");
+        }
+        assert!(matches!(from(file, header, "none.raw"), Err(SequenceError::Disk { .. })), "{file}");
+    }
+}
