@@ -40,7 +40,7 @@ pub struct ReplaySettings {
     pub lost_after: f64,
     /// How long the force may take to settle (s).
     pub settle_within: f64,
-    /// Speed along the path at first after a pause (m/s).
+    /// Speed of the probe at first after a pause (m/s).
     pub resume_speed: f64,
     /// The law that holds the force; its lowest and highest offset come from the plan.
     pub law: ContactSettings,
@@ -125,6 +125,8 @@ pub struct Replay {
     last: Joints,
     begun: bool,
     board: Board,
+    /// The most that the probe moves off the path (m/s): little after a pause, then e times as much each second.
+    pace: f64,
     dt: f64,
 }
 
@@ -144,7 +146,8 @@ impl Replay {
         let (last, dt) = (plan.start, plan.arm.period.seconds());
         let (stage, touch) = (Stage::Approach { leg: 0 }, Touch::new(settings.lost_after, dt));
         let board = Board::default();
-        Ok(Self { plan, settings, operator, stage, legs, clock, law, touch, last, begun: false, board, dt })
+        let (begun, pace) = (false, f64::INFINITY);
+        Ok(Self { plan, settings, operator, stage, legs, clock, law, touch, last, begun, board, pace, dt })
     }
 
     /// Where it is now.
@@ -163,7 +166,8 @@ impl Replay {
 
     /// Through the air; at the end the descent begins at once.
     fn approach(&mut self, state: &State, leg: usize, pause: bool) -> Option<Joints> {
-        match self.legs.get_mut(leg).map(|leg| (leg.step(pause, self.dt), *leg.target())) {
+        let share = if pause { 0.0 } else { self.pace / self.plan.settings.air_speed };
+        match self.legs.get_mut(leg).map(|leg| (leg.step(share, self.dt), *leg.target())) {
             Some((Some(joints), _)) => Some(joints),
             Some((None, target)) => {
                 self.last = target;
@@ -186,8 +190,8 @@ impl Replay {
         }
         let speed = match (pause, air) {
             (true, _) => 0.0,
-            (_, true) => self.settings.air_speed,
-            (_, false) => self.settings.touch_speed,
+            (_, true) => self.settings.air_speed.min(self.pace),
+            (_, false) => self.settings.touch_speed.min(self.pace),
         };
         self.law.step_at(speed, self.pressing(state));
         let force = self.law.force_n();
@@ -265,7 +269,7 @@ impl Replay {
             self.finish(ending);
             return None;
         }
-        let speed = if up || pause { 0.0 } else { -self.settings.air_speed };
+        let speed = if up || pause { 0.0 } else { -self.settings.air_speed.min(self.pace) };
         self.law.step_at(speed, self.pressing(state));
         self.on_path()
     }
@@ -288,6 +292,7 @@ impl Replay {
 
     fn tick(&mut self, state: &State) -> Option<Joints> {
         let pause = self.operator.wish() != Asked::Go;
+        self.pace = if pause { self.settings.resume_speed } else { self.pace * (1.0 + self.dt) };
         match self.stage {
             Stage::Approach { leg } => self.approach(state, leg, pause),
             Stage::Descend => self.descend(state, pause),

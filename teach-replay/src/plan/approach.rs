@@ -53,12 +53,12 @@ impl Leg {
         self.motion.duration_s() / self.pace
     }
 
-    /// The next joints; none when the leg is done.
-    pub(crate) fn step(&mut self, pause: bool, dt: f64) -> Option<Joints> {
+    /// The next joints, at this share of the leg's pace (0 to rest); none when the leg is done.
+    pub(crate) fn step(&mut self, share: f64, dt: f64) -> Option<Joints> {
         if self.clock.at() >= self.motion.duration_s() {
             return None;
         }
-        let time = self.clock.step(if pause { 0.0 } else { self.pace }, dt);
+        let time = self.clock.step(self.pace * share.clamp(0.0, 1.0), dt);
         Some(self.motion.at(time))
     }
 

@@ -1,5 +1,7 @@
 //! A replay on the small plant, judged by what was truly commanded and truly felt.
 
+use std::cell::{Cell, RefCell};
+
 use probepath_robot::{Ending, Finished, Guard, GuardLimits, Tick, Wish, run};
 
 use super::plant::{DT, Plant, Skin, Truth, arm, home, path};
@@ -203,5 +205,111 @@ fn settings_that_cannot_be_are_refused_by_name() {
     ] {
         let refused = Replay::new(plan.clone(), settings, Operator::new());
         assert!(matches!(refused, Err(ReplayError::Setting { .. })));
+    }
+}
+
+/// Ticks after each phase began: as it begins, soon after, and well within.
+const WITHIN: [usize; 3] = [0, 20, 300];
+const PHASES: [ReplayPhase; 5] = [
+    ReplayPhase::Approach,
+    ReplayPhase::Descend,
+    ReplayPhase::Settle,
+    ReplayPhase::Follow,
+    ReplayPhase::Lift,
+];
+
+/// The short way of a path, at twice the usual speed, so that a slow resume shows.
+fn short_fast_plan() -> Plan {
+    let settings = PlanSettings {
+        speed: probepath_robot::motion::timing::PathSpeed::gentle(0.02),
+        ..PlanSettings::default()
+    };
+    Plan::new(&path().trimmed(0.0, 0.03).unwrap(), &arm(), &home(), &settings).unwrap()
+}
+
+/// Tells, tick by tick, whether a phase has been going on for so long.
+fn reaches(phase: ReplayPhase, within: usize) -> impl FnMut(&ReplayStatus) -> bool {
+    let mut ticks = 0;
+    move |status| {
+        ticks += usize::from(status.phase == phase);
+        ticks == within + 1 && status.phase == phase
+    }
+}
+
+#[test]
+fn a_pause_in_every_phase_comes_to_rest_and_a_resume_is_slow() {
+    let plan = short_fast_plan();
+    for phase in PHASES {
+        for within in WITHIN {
+            let (reached, at) = (RefCell::new(reaches(phase, within)), Cell::new(None));
+            let outcome = replay_plan(plan.clone(), SOFT, 11, |status, tick, operator| {
+                if reached.borrow_mut()(status) {
+                    operator.pause();
+                    at.set(Some(tick));
+                }
+                if at.get().is_some_and(|at| tick == at + 750) {
+                    operator.resume();
+                }
+            });
+            let what = format!("{phase:?} + {within} ticks");
+            assert_eq!(outcome.status.ending, Some(ReplayEnding::Completed), "{what}");
+            assert!(read_back(&outcome.truth).iter().all(|part| *part <= 1.0), "{what}");
+            let at = at.get().expect("every phase was reached");
+            paused_at_rest(&outcome, at, &what);
+        }
+    }
+}
+
+/// At the end of a pause nothing moves but what holds the force, and the way goes on at 10 mm/s at most.
+fn paused_at_rest(outcome: &Outcome, at: usize, what: &str) {
+    let before = outcome.truth.len() - outcome.seen.len();
+    let end = at + 740;
+    let (seen, truth) = (&outcome.seen[end], &outcome.truth[before + end - 100..before + end]);
+    assert!(seen.speed_m_s == 0.0, "{what}: {seen:?}");
+    if matches!(seen.phase, ReplayPhase::Settle | ReplayPhase::Follow) {
+        assert!((truth[99].force_n - seen.set_n).abs() < 0.5, "{what}: {:?} {seen:?}", truth[99]);
+    } else {
+        let moved = truth[99].commanded.zip(&truth[0].commanded, |a, b| (a - b).abs()).largest();
+        assert!(moved < 1e-9, "{what}: {moved}");
+    }
+    // The commanded probe, the force's share left out where there is one, half a second from the resume on.
+    let (arm, mut fastest) = (arm(), 0.0_f64);
+    for i in at + 751..(at + 1000).min(outcome.seen.len()) {
+        let probe = |i: usize| arm.probe(&outcome.truth[before + i].commanded);
+        let way = (probe(i - 1).inverse() * probe(i)).isometry().translation.vector;
+        let held = matches!(outcome.seen[i].phase, ReplayPhase::Settle | ReplayPhase::Follow);
+        let speed = if held { way.xy().norm() } else { way.norm() } / DT;
+        let allowed = 0.01 * (1.0 + (i - at - 750) as f64 * DT).powi(2);
+        assert!(speed <= allowed + 2e-4, "{what}: {speed} m/s {} ticks after the resume", i - at - 750);
+        fastest = fastest.max(speed);
+    }
+    assert!(fastest > 0.0 || seen.phase == ReplayPhase::Settle, "{what}: it never went on");
+}
+
+#[test]
+fn a_stop_in_every_phase_brakes_and_a_lift_off_then_takes_the_probe_off_the_skin() {
+    let plan = short_fast_plan();
+    for phase in PHASES {
+        for within in WITHIN {
+            let (what, operator) = (format!("{phase:?} + {within} ticks"), Operator::new());
+            let mut replay = Replay::new(plan.clone(), ReplaySettings::default(), operator.clone()).unwrap();
+            let (watch, mut reached) = (replay.watch(), reaches(phase, within));
+            let mut plant = Plant::new(SOFT, home(), 13);
+            let mut guard =
+                Guard::new(GuardLimits::default(), arm().limits).unwrap().listening_to(operator.clone());
+            let mut observer = |_: &Tick| {
+                if reached(&watch.status()) {
+                    operator.stop();
+                }
+                Wish::GoOn
+            };
+            let stopped = run(&mut plant, &mut replay, &mut guard, &mut observer).unwrap();
+            assert_eq!(stopped.ending, Ending::Operator, "{what}");
+            let mut guard = Guard::new(GuardLimits::default(), arm().limits).unwrap();
+            let mut lift = crate::LiftOff::new(arm(), 0.04, 0.02).unwrap();
+            run(&mut plant, &mut lift, &mut guard, &mut ()).unwrap();
+            assert!(plant.truth[plant.truth.len() - 1].force_n == 0.0, "{what}: still on the skin");
+            assert!(read_back(&plant.truth).iter().all(|part| *part <= 1.0 + 1e-9), "{what}");
+        }
     }
 }
