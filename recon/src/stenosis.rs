@@ -74,7 +74,7 @@ pub(crate) fn find(sections: &[Section], least_percent_area: f64) -> Vec<Stenosi
     let places: Vec<Place> = sections
         .iter()
         .filter_map(|section| {
-            let measure = section.measure.as_ref()?;
+            let measure = section.measure.as_ref().filter(|measure| measure.area_mm2.is_finite())?;
             Some(Place { at: section.at_mm, area: measure.area_mm2, sd: measure.area_sd_mm2 })
         })
         .collect();
@@ -172,3 +172,6 @@ fn reference(places: &[Place], from: f64, to: f64, side: ReferenceSide) -> Optio
     let median = areas[areas.len() / 2];
     Some((median, Reference { side, from_mm: first.at, to_mm: last.at }))
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,106 @@
+use probepath_frames::{Direction, Point};
+
+use super::*;
+use crate::SectionMeasure;
+
+/// A narrowing: place (mm), length (mm), part of the area that is missing.
+type Narrowing = (f64, f64, f64);
+
+/// Sections every half millimetre of a vessel of 50 mm2 with cosine-shaped narrowings.
+fn vessel(length_mm: f64, narrowings: &[Narrowing]) -> Vec<Section> {
+    let count = (length_mm / 0.5) as usize + 1;
+    (0..count).map(|i| section(i as f64 * 0.5, Some(area_at(i as f64 * 0.5, narrowings)))).collect()
+}
+
+fn area_at(at_mm: f64, narrowings: &[Narrowing]) -> f64 {
+    let missing = |&(place, length, part): &Narrowing| {
+        let off = at_mm - place;
+        let inside = off.abs() <= length / 2.0;
+        if inside { part * 0.5 * (1.0 + (std::f64::consts::TAU * off / length).cos()) } else { 0.0 }
+    };
+    50.0 * (1.0 - narrowings.iter().map(missing).sum::<f64>())
+}
+
+fn section(at_mm: f64, area: Option<f64>) -> Section {
+    let measure = |area_mm2: f64| SectionMeasure {
+        area_mm2,
+        area_sd_mm2: 0.5,
+        equivalent_diameter_mm: 0.0,
+        least_diameter_mm: 0.0,
+        largest_diameter_mm: 0.0,
+    };
+    let centre = Point::new(0.0, 0.0, at_mm * 1e-3);
+    Section { at_mm, centre, normal: Direction::z(), measure: area.map(measure) }
+}
+
+#[test]
+fn the_reference_is_the_normal_segment_before_the_stenosis() {
+    let mut sections = vessel(80.0, &[(40.0, 20.0, 0.75)]);
+    // Wider beyond: the reference stays proximal.
+    for section in sections.iter_mut().filter(|section| section.at_mm > 50.0) {
+        *section = self::section(section.at_mm, Some(60.0));
+    }
+    let [found] = find(&sections, 35.0)[..] else { panic!("one stenosis") };
+    assert!((found.percent_area - 75.0).abs() < 0.5, "{found:?}");
+    assert!((found.percent_diameter - 50.0).abs() < 0.5 && (found.at_mm - 40.0).abs() < 0.1, "{found:?}");
+    assert!((found.percent_area_sd - 1.0).abs() < 0.05, "0.5 of 50 mm2");
+    let reference = found.reference;
+    assert_eq!(reference.side, ReferenceSide::Proximal);
+    assert!(reference.to_mm <= found.from_mm && reference.to_mm - reference.from_mm >= 9.0, "{reference:?}");
+}
+
+#[test]
+fn where_nothing_lies_before_it_the_segment_after_it_is_the_reference() {
+    let [found] = find(&vessel(60.0, &[(5.0, 20.0, 0.6)]), 35.0)[..] else { panic!("one stenosis") };
+    assert_eq!(found.reference.side, ReferenceSide::Distal);
+    assert!((found.percent_area - 60.0).abs() < 1.0 && found.reference.from_mm > found.at_mm, "{found:?}");
+}
+
+#[test]
+fn a_stenosis_at_the_end_of_the_scan_is_measured_against_what_lies_before_it() {
+    let [found] = find(&vessel(60.0, &[(58.0, 20.0, 0.7)]), 35.0)[..] else { panic!("one stenosis") };
+    assert_eq!(found.reference.side, ReferenceSide::Proximal);
+    assert!((found.percent_area - 70.0).abs() < 1.0 && found.from_mm + found.length_mm <= 60.0, "{found:?}");
+}
+
+#[test]
+fn two_lesions_close_together_are_two() {
+    let found = find(&vessel(100.0, &[(40.0, 16.0, 0.75), (58.0, 16.0, 0.6)]), 35.0);
+    let [first, second] = found[..] else { panic!("{found:?}") };
+    assert!((first.percent_area - 75.0).abs() < 1.5 && (first.at_mm - 40.0).abs() < 0.1, "{first:?}");
+    assert!((second.percent_area - 60.0).abs() < 6.0 && (second.at_mm - 58.0).abs() < 0.1, "{second:?}");
+    assert!(first.from_mm + first.length_mm <= second.from_mm + 1.0, "they do not overlap");
+}
+
+#[test]
+fn a_healthy_vessel_and_one_that_tapers_have_none() {
+    assert!(find(&vessel(100.0, &[]), 35.0).is_empty());
+    assert!(find(&vessel(100.0, &[(50.0, 20.0, 0.3)]), 35.0).is_empty(), "30 % is less than is asked for");
+    let taper: Vec<Section> =
+        (0..200).map(|i| section(f64::from(i) * 0.5, Some(50.0 - 0.15 * f64::from(i)))).collect();
+    assert!(find(&taper, 35.0).is_empty(), "a branch takes its part of the flow");
+}
+
+#[test]
+fn what_was_not_measured_or_is_no_number_makes_no_stenosis() {
+    assert!(find(&[], 35.0).is_empty());
+    let none: Vec<Section> = (0..100).map(|i| section(f64::from(i) * 0.5, None)).collect();
+    assert!(find(&none, 35.0).is_empty());
+    let nan: Vec<Section> = (0..100).map(|i| section(f64::from(i) * 0.5, Some(f64::NAN))).collect();
+    assert!(find(&nan, 35.0).is_empty());
+    let mut sections = vessel(80.0, &[(40.0, 20.0, 0.75)]);
+    // A section without a lumen, and one that is no number, in the middle of the shoulder.
+    sections[70].measure = None;
+    sections[88] = section(44.0, Some(f64::NAN));
+    let [found] = find(&sections, 35.0)[..] else { panic!("one stenosis") };
+    assert!((found.percent_area - 75.0).abs() < 0.5, "{found:?}");
+}
+
+#[test]
+fn a_narrowing_that_is_less_than_sure_is_not_called_one() {
+    let mut sections = vessel(80.0, &[(40.0, 20.0, 0.5)]);
+    for measure in sections.iter_mut().filter_map(|section| section.measure.as_mut()) {
+        measure.area_sd_mm2 = 10.0;
+    }
+    assert!(find(&sections, 35.0).is_empty(), "50 % +- 20");
+}
