@@ -1,6 +1,7 @@
 //! [`Path`]: what was taught, cleaned: poses at uniform spacing along the skin.
 
 mod beside;
+mod bins;
 mod clean;
 mod contact;
 mod file;
