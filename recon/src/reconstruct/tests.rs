@@ -112,3 +112,15 @@ fn what_cannot_be_worked_with_is_an_error_that_says_why() {
     let still: Vec<PlacedBScan> = (0..6).map(|_| images()[0].clone()).collect();
     assert!(matches!(reconstruct_lumen(&still, &settings), Err(ReconError::NoLength { .. })));
 }
+
+#[test]
+fn images_before_the_lumen_was_first_found_are_won_back_from_those_after() {
+    // A seed in the tissue: the first images show nothing there, and the lumen is found only later.
+    let seed = Some(SeedPoint::Millimetres { x_mm: 3.0, y_mm: 3.0 });
+    let settings = LumenSettings { seed, ..LumenSettings::default() };
+    let found = reconstruct_lumen(&images()[..16], &settings).expect("a lumen later on");
+    assert_eq!(found.counts.without_lumen, 0, "{:?}", found.counts);
+    let truth = std::f64::consts::PI * 3.935 * 3.935;
+    let first = found.images[0].lumen.as_ref().expect("won back");
+    assert!((first.area_mm2 / truth - 1.0).abs() < 0.15, "{} mm2", first.area_mm2);
+}
