@@ -30,6 +30,12 @@ const FAR_M: f64 = 0.05;
 pub trait Surface {
     /// Signed distance to the surface (m, negative inside) and the outward normal there.
     fn surface(&self, point: Point<World>) -> (f64, Direction<World>);
+
+    /// Where a sonographer would hold the probe to look at `inside`: outward over it. The nearest skin's normal, but
+    /// for a body with faces that nobody scans through.
+    fn outward_over(&self, inside: Point<World>) -> Direction<World> {
+        self.surface(inside).1
+    }
 }
 
 /// How the skin behaves; all of it varies along the leg from the seed.

@@ -59,6 +59,14 @@ impl Surface for Subject {
             Self::Phantom(phantom) => phantom.surface(point),
         }
     }
+
+    fn outward_over(&self, inside: Point<World>) -> Direction<World> {
+        match self {
+            Self::Leg(_) => self.surface(inside).1,
+            // Through its flat top, however near its end.
+            Self::Phantom(_) => Direction::y().reversed(),
+        }
+    }
 }
 
 impl Tissue for Subject {

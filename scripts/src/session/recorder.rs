@@ -127,6 +127,9 @@ impl Observer for Recorder<'_> {
         if let Some(recording) = &mut self.recording {
             let (stamp, wrench, guiding) = (state.stamp, state.wrench, state.guiding);
             recording.push(Sample { stamp, base_from_probe, wrench, guiding });
+            if recording.lost() > 0 {
+                return Wish::Stop("ten minutes were recorded: let go of the switch earlier".into());
+            }
         }
         if let Some(figures) = &mut self.figures
             && !tick.braking

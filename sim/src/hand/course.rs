@@ -22,7 +22,7 @@ impl Course {
     pub(crate) fn over(body: &dyn Surface, skin: &Skin, vessel: &Vessel, from_m: f64, length_m: f64) -> Self {
         let count = (length_m / SPACING_M).round().max(1.0) as usize + 1;
         let arc = |i: usize| from_m + SPACING_M * i as f64;
-        let ups: Vec<_> = (0..count).map(|i| body.surface(vessel.centre(arc(i))).1.vector()).collect();
+        let ups: Vec<_> = (0..count).map(|i| body.outward_over(vessel.centre(arc(i))).vector()).collect();
         let poses = (0..count)
             .map(|i| {
                 let near = &ups[i.saturating_sub(NEIGHBOURS)..(i + NEIGHBOURS + 1).min(count)];
