@@ -57,8 +57,9 @@ pub(super) fn stenoses(truth: &Truth, recon: &LumenReconstruction) -> Vec<Stenos
     let vessel = truth.subject().main();
     let Some((from, until)) = reach(vessel, recon) else { return Vec::new() };
     let covered = (from + BEYOND_M, until - BEYOND_M);
-    let inside =
-        |s: &&probepath_sim::Stenosis| s.at_m - s.length_m > covered.0 && s.at_m + s.length_m < covered.1;
+    let inside = |s: &&probepath_sim::Stenosis| {
+        s.at_m - s.length_m / 2.0 > covered.0 && s.at_m + s.length_m / 2.0 < covered.1
+    };
     vessel
         .stenoses()
         .iter()
