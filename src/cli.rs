@@ -26,8 +26,8 @@ pub enum Command {
     Reconstruct(Reconstruct),
     /// How far a surface is from a gold standard.
     Compare(Compare),
-    /// Between the formats of sequences (.igs.mha, .igs.mhd, .igs.nrrd), volumes (.mha, .nrrd), surfaces (.stl, .ply,
-    /// .vtp) and exams (.mcap, read only).
+    /// Between the formats of sequences (.igs.mha, .igs.mhd, .igs.nrrd), of volumes (.mha, .nrrd), and of surfaces
+    /// (.stl, .ply, .vtp).
     Convert(Convert),
     /// What the model of an arm says; forward and inverse kinematics.
     Arm(Arm),

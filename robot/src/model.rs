@@ -104,6 +104,11 @@ impl Model {
         &self.names
     }
 
+    /// Whether a joint slides (m) instead of turning (rad).
+    pub fn slides(&self, joint: usize) -> bool {
+        self.segments.iter().any(|segment| segment.joint == joint && segment.slides && segment.scale != 0.0)
+    }
+
     /// Their limits, from base to tip.
     pub fn limits(&self) -> &[JointLimit] {
         &self.limits

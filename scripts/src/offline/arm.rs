@@ -14,9 +14,9 @@ use thiserror::Error;
 pub struct ArmQuestion {
     /// A URDF file, or `ur5e` or `seven_joint`.
     pub urdf: String,
-    /// The chain's first link; the file's only root when absent.
+    /// The chain's first link; the file's root when absent.
     pub base: Option<String>,
-    /// The chain's last link; `tool0` or `flange` when absent.
+    /// The chain's last link; the end of the longest chain when absent.
     pub tip: Option<String>,
     /// Joint positions (degrees, mm).
     pub joints_deg: Option<Vec<f64>>,
@@ -50,12 +50,14 @@ pub struct ArmAnswer {
 pub struct JointRow {
     /// Its name.
     pub name: String,
-    /// Lower limit (degrees, mm).
-    pub lower_deg: f64,
-    /// Upper limit (degrees, mm).
-    pub upper_deg: f64,
-    /// Speed limit (degrees/s, mm/s).
-    pub velocity_deg_s: f64,
+    /// The unit of its numbers: `degrees`, or `mm` for a joint that slides.
+    pub unit: &'static str,
+    /// Lower limit.
+    pub lower: f64,
+    /// Upper limit.
+    pub upper: f64,
+    /// Speed limit, a second.
+    pub velocity_per_s: f64,
 }
 
 /// Forward kinematics.
@@ -110,7 +112,6 @@ pub enum ArmError {
 /// When the URDF is none, has no such links, or the question does not fit the arm.
 pub fn arm(question: &ArmQuestion) -> Result<ArmAnswer, ArmError> {
     let (model, warnings) = load(question)?;
-    let unit = |value: f64| value.to_degrees();
     Ok(ArmAnswer {
         name: model.name().to_owned(),
         base: model.base_link().to_owned(),
@@ -119,11 +120,13 @@ pub fn arm(question: &ArmQuestion) -> Result<ArmAnswer, ArmError> {
             .joint_names()
             .iter()
             .zip(model.limits())
-            .map(|(name, limit)| JointRow {
+            .enumerate()
+            .map(|(joint, (name, limit))| JointRow {
                 name: name.clone(),
-                lower_deg: unit(limit.lower),
-                upper_deg: unit(limit.upper),
-                velocity_deg_s: unit(limit.velocity),
+                unit: if model.slides(joint) { "mm" } else { "degrees" },
+                lower: shown(&model, joint, limit.lower),
+                upper: shown(&model, joint, limit.upper),
+                velocity_per_s: shown(&model, joint, limit.velocity),
             })
             .collect(),
         warnings,
@@ -138,10 +141,27 @@ fn load(question: &ArmQuestion) -> Result<(Model, Vec<String>), ArmError> {
         ("seven_joint", None, None) => return Ok((Model::seven_joint(), Vec::new())),
         _ => {}
     }
-    let (base, tip) =
-        (question.base.as_deref().unwrap_or("base_link"), question.tip.as_deref().unwrap_or("tool0"));
-    let (model, warnings) = Model::from_urdf_file(Path::new(&question.urdf), base, tip)?;
+    let file = Path::new(&question.urdf);
+    let (base, tip) = match (&question.base, &question.tip) {
+        (Some(base), Some(tip)) => (base.clone(), tip.clone()),
+        (base, tip) => {
+            let unreadable = |why: std::io::Error| ModelError::Unreadable {
+                file: question.urdf.clone(),
+                why: why.to_string(),
+            };
+            let text = std::fs::read_to_string(file).map_err(unreadable)?;
+            let (root, ends) = Model::ends_of_urdf(&text, &question.urdf)?;
+            let end = ends.into_iter().next().unwrap_or_else(|| root.clone());
+            (base.clone().unwrap_or(root), tip.clone().unwrap_or(end))
+        }
+    };
+    let (model, warnings) = Model::from_urdf_file(file, &base, &tip)?;
     Ok((model, warnings.iter().map(ToString::to_string).collect()))
+}
+
+/// A position or a rate of a joint as people read it: degrees, or mm where it slides.
+fn shown(model: &Model, joint: usize, value: f64) -> f64 {
+    if model.slides(joint) { value * 1e3 } else { value.to_degrees() }
 }
 
 fn forward(model: &Model, degrees: &[f64]) -> Result<Forward, ArmError> {
@@ -149,7 +169,10 @@ fn forward(model: &Model, degrees: &[f64]) -> Result<Forward, ArmError> {
         let names = model.joint_names().join(", ");
         return Err(ArmError::Count { given: degrees.len(), needed: model.joints(), names });
     }
-    let joints = Joints::from_slice(degrees)?.map(f64::to_radians);
+    let mut joints = Joints::from_slice(degrees)?;
+    for joint in 0..joints.len() {
+        joints[joint] *= if model.slides(joint) { 1e-3 } else { 1f64.to_radians() };
+    }
     let base_from_flange = model.forward(&joints);
     let jacobian = model.jacobian(&joints, &Pose::<Flange, Flange>::identity());
     let turn = base_from_flange.isometry().rotation.scaled_axis();
@@ -175,7 +198,7 @@ fn inverse(model: &Model, pose: &[f64]) -> Result<Vec<f64>, ArmError> {
     let middle = middle(model);
     let joints =
         model.inverse(&target, &Pose::<Flange, Flange>::identity(), &middle, &InverseOptions::default())?;
-    Ok(joints.iter().map(f64::to_degrees).collect())
+    Ok(joints.iter().enumerate().map(|(joint, position)| shown(model, joint, position)).collect())
 }
 
 /// The posture in the middle of every joint's range: nobody said where the arm is.
@@ -192,10 +215,10 @@ impl fmt::Display for ArmAnswer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}: {} joints from {} to {}", self.name, self.joints.len(), self.base, self.tip)?;
         for joint in &self.joints {
-            let (low, high, speed) = (joint.lower_deg, joint.upper_deg, joint.velocity_deg_s);
+            let (low, high, speed, unit) = (joint.lower, joint.upper, joint.velocity_per_s, joint.unit);
             writeln!(
                 f,
-                "  {:<24} {low:>8.1} to {high:>7.1} degrees, at most {speed:.0} degrees/s",
+                "  {:<24} {low:>8.1} to {high:>7.1} {unit}, at most {speed:.0} {unit}/s",
                 joint.name
             )?;
         }
@@ -217,7 +240,7 @@ impl fmt::Display for ArmAnswer {
         }
         if let Some(joints) = &self.inverse_deg {
             let shown: Vec<String> = joints.iter().map(|q| format!("{q:.4}")).collect();
-            writeln!(f, "joints: {} degrees", shown.join(", "))?;
+            writeln!(f, "joints: {}", shown.join(", "))?;
         }
         Ok(())
     }
@@ -249,6 +272,23 @@ mod tests {
         for (a, b) in again.position_mm.iter().zip(&flange) {
             assert!((a - b).abs() < 1e-6, "{again:?}");
         }
+    }
+
+    #[test]
+    fn a_rail_is_in_millimetres_and_the_ends_of_a_chain_are_found() {
+        let urdf = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/golden/kinematics/gantry.urdf");
+        let gantry = arm(&ArmQuestion { urdf: urdf.into(), ..ArmQuestion::default() }).unwrap();
+        let units: Vec<_> = gantry.joints.iter().map(|joint| joint.unit).collect();
+        assert!(units.contains(&"mm") && units.contains(&"degrees"), "{gantry}");
+        let at = |first: f64| {
+            let mut joints = vec![0.0; units.len()];
+            joints[units.iter().position(|unit| *unit == "mm").unwrap()] = first;
+            let question =
+                ArmQuestion { urdf: urdf.into(), joints_deg: Some(joints), ..ArmQuestion::default() };
+            nalgebra::Vector3::from(arm(&question).unwrap().forward.unwrap().position_mm)
+        };
+        // A rail moved by a millimetre moves the flange by as many as ride on it: at least one.
+        assert!((at(1.0) - at(0.0)).norm() > 0.999);
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use probepath_recon::volume::{Layer, Mark, Slice, Volume, VolumeError, VolumeSettings};
 use probepath_recon::{LumenSettings, ReconError, reconstruct_lumen};
+use probepath_teach_replay::Path as TaughtPath;
 use probepath_us_capture::exam::{Attachment, Ending, Exam, ExamError};
 use probepath_us_capture::plus::{PlusConfig, PlusError};
 use probepath_us_capture::sequence::{
@@ -192,11 +193,12 @@ fn json<T: serde::de::DeserializeOwned>(exam: &Exam, name: &str) -> Option<T> {
 fn heading(exam: &Exam, figures: &ScanFigures) -> Heading {
     let calibration = exam.attachment(Attachment::CALIBRATION).and_then(|a| a.text().ok());
     let calibration = calibration.and_then(|text| Calibration::from_toml(text).ok());
-    let side = exam.attachment(Attachment::PATH).and_then(|a| a.text().ok());
-    let side = if side.is_some_and(|text| text.contains("right")) { "right" } else { "left" };
+    let path = exam.attachment(Attachment::PATH).and_then(|a| a.text().ok());
+    let path = path.and_then(|text| TaughtPath::from_text(text, Path::new(Attachment::PATH)).ok());
+    let side = path.map_or_else(String::new, |path| format!("{:?}", path.label().side).to_lowercase());
     Heading {
         study: exam.header.study_code.clone(),
-        side: side.into(),
+        side,
         cell: "recorded".into(),
         protocol: exam.header.protocol.clone(),
         protocol_sha256: exam.header.protocol_sha256.clone(),

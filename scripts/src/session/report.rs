@@ -1,6 +1,7 @@
 //! The report step.
 
-use probepath_us_capture::exam::{Attachment, ExamHeader};
+use probepath_frames::Point;
+use probepath_us_capture::exam::{Attachment, ExamHeader, Surface};
 
 use super::{Lumen, SOFTWARE, Session, SessionError};
 use crate::report::Heading;
@@ -41,9 +42,18 @@ impl Session {
             exam: &exam,
         };
         let report = make(&from, &self.opening.out)?;
+        self.show_surface(lumen);
         self.opening.progress.at("reporting", 1.0);
         self.report = Some(report);
         Ok(())
+    }
+
+    /// The lumen in the exam, for viewers.
+    fn show_surface(&self, lumen: &Lumen) {
+        let Some(exam) = &self.exam else { return };
+        let mesh = lumen.recon.surface.mesh();
+        let vertices = mesh.points.iter().map(|p| Point::from_vector(*p)).collect();
+        exam.surface(Surface { stamp: self.now, name: "lumen".into(), vertices, triangles: mesh.triangles });
     }
 
     fn heading(&self, lumen: &Lumen) -> Heading {

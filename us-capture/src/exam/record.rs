@@ -122,7 +122,7 @@ impl Attachment {
     /// Name of the protocol's text.
     pub const PROTOCOL: &str = "protocol.rhai";
     /// Name of the taught path.
-    pub const PATH: &str = "path.json";
+    pub const PATH: &str = "taught.path.toml";
     /// Name of the report.
     pub const REPORT: &str = "report.html";
 
@@ -153,7 +153,7 @@ impl Attachment {
 
     /// The taught path.
     pub fn path(text: impl Into<Vec<u8>>) -> Self {
-        Self::new(Self::PATH, "application/json", text)
+        Self::new(Self::PATH, "application/toml", text)
     }
 
     /// The report.
