@@ -23,6 +23,9 @@ use crate::session::{SCAN_FIGURES, SEGMENTS, SOFTWARE};
 /// Voxel size when nothing says another (mm).
 const VOXEL_MM: f64 = 0.5;
 
+/// A calibration whose rigid part is further off than this (m) is worth a note.
+const SHEAR_M: f64 = 0.0005;
+
 /// What was reconstructed.
 #[derive(Clone, Debug, Serialize)]
 pub struct Reconstructed {
@@ -230,6 +233,13 @@ fn sequence(
     let mut notes: Vec<String> = sequence.notes().iter().map(ToString::to_string).collect();
     if placed.unstamped > 0 {
         notes.push(format!("{} images carry no stamp", placed.unstamped));
+    }
+    if placed.off_rigid_m > SHEAR_M {
+        notes.push(format!(
+            "the calibration is no rigid pose and a pixel size: a rigid one is up to {:.2} mm off; the volume was built \
+             with it as it stands",
+            placed.off_rigid_m * 1e3
+        ));
     }
     if !volume {
         notes.push("nothing was built: ask for --volume".into());

@@ -90,7 +90,8 @@ fn heading(body: &mut String, report: &Report) {
     let _ = write!(body, "<p class='verdict'>{verdict}</p>");
 }
 
-fn count(n: usize, one: &str, many: &str) -> String {
+/// A number and its noun.
+pub(super) fn count(n: usize, one: &str, many: &str) -> String {
     format!("{n} {}", if n == 1 { one } else { many })
 }
 

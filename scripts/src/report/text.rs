@@ -35,10 +35,10 @@ impl Report {
         let of = &self.exam_of;
         writeln!(
             f,
-            "{} leg, study {}: {} stenoses in {:.0} mm",
+            "{} leg, study {}: {} in {:.0} mm",
             of.side,
             of.study,
-            self.stenoses.len(),
+            super::html::count(self.stenoses.len(), "stenosis", "stenoses"),
             self.measured_mm()
         )?;
         if self.stenoses.is_empty() {
