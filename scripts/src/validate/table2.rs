@@ -38,6 +38,11 @@ const ROWS: [Row; 9] = [
     zoomed("zoom 4:7", 14.0, 40.0, "0.46 ± 0.03"),
 ];
 
+/// The phantom's stenoses, percent of area ([P1] II.C.1).
+const TRUE_PERCENT: [f64; 2] = [80.0, 75.0];
+/// The hand goes this far, so that both stenoses lie whole inside what is scanned (mm).
+const HAND_MM: f64 = 118.0;
+
 /// The setting whose figures are goals.
 const GOAL: &str = "zoom 3:7";
 
@@ -79,6 +84,7 @@ struct Figures {
 impl Figures {
     fn add(&mut self, setting: &Row, seed: u64, out: &std::path::Path) -> Result<(), ValidateError> {
         let mut simulated = CellConfig::phantom();
+        simulated.hand.length_mm = HAND_MM;
         let machine = &mut simulated.machine;
         (machine.depth_mm, machine.focus_mm) = (setting.depth_mm, setting.focus_mm);
         machine.window = setting.window;
@@ -94,10 +100,12 @@ impl Figures {
             self.mean.push(error.mean);
             self.p95.push(error.p95);
         }
-        for (values, stenosis) in self.areas.iter_mut().zip(bench.session.stenosis_errors(&lumen)) {
-            // A stenosis that was not found is wrong by all of it.
-            let found = stenosis.found_percent_area.unwrap_or(0.0);
-            values.push((found - stenosis.true_percent_area).abs());
+        let errors = bench.session.stenosis_errors(&lumen);
+        for (values, truth) in self.areas.iter_mut().zip(TRUE_PERCENT) {
+            let near = errors.iter().find(|error| (error.true_percent_area - truth).abs() < 0.1);
+            // A stenosis that was not scanned whole, or not found, is wrong by all of it.
+            let found = near.and_then(|error| error.found_percent_area).unwrap_or(0.0);
+            values.push((found - truth).abs());
         }
         Ok(())
     }
@@ -112,8 +120,8 @@ impl Figures {
             Some(setting.published),
         ));
         rows.push(Goal::of(format!("{name}: 95th percentile"), &self.p95, None, None));
-        for (values, truth) in self.areas.iter().zip(["80.0", "75.0"]) {
-            let figure = format!("{name}: {truth} % area, off by");
+        for (values, truth) in self.areas.iter().zip(TRUE_PERCENT) {
+            let figure = format!("{name}: {truth:.1} % area, off by");
             rows.push(Goal::of(figure, values, goal.then_some(3.0), None));
         }
     }
