@@ -81,7 +81,7 @@ fn a_file_cut_anywhere_is_refused_or_whole() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(2000))]
+    #![proptest_config(ProptestConfig { cases: 2000, rng_seed: proptest::test_runner::RngSeed::Fixed(1), failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn lengths_go_through_millimetres_to_the_last_bit_but_one(metres in 1e-6..1.0f64) {
