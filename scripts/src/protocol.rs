@@ -80,7 +80,7 @@ pub enum ProtocolError {
     },
     /// The script computes without end.
     #[error(
-        "{file}:{place}: the protocol ran {MOST_OPERATIONS} operations without a step; is there a loop that never ends?"
+        "{file}:{place}: the protocol ran {MOST_OPERATIONS} operations, far more than a scan needs; is there a loop that never ends?"
     )]
     Endless {
         /// The protocol.
