@@ -5,7 +5,11 @@
 mod bscan;
 mod calibration;
 mod capture;
+pub mod dots;
 pub mod exam;
+pub mod fit;
+pub mod label;
+pub mod phantom;
 mod pixel_map;
 pub mod plus;
 pub mod sequence;
