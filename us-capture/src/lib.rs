@@ -13,6 +13,7 @@ pub mod phantom;
 mod pixel_map;
 pub mod plus;
 pub mod sequence;
+pub mod shots;
 mod source;
 
 pub use bscan::{BScan, BadBScan, PixelSpacing, PlacedBScan, Setting};

@@ -38,7 +38,7 @@ pub use image::{SequenceImage, Status, Tracked, TransformName};
 pub use note::Note;
 pub use orientation::Orientation;
 pub use payload::{Claim, Packing, unpack};
-pub use place::{NoChain, Placed, PlacedSequence, Placing, SkipReason, Skipped};
+pub use place::{ChainNames, MaybePose, NoChain, Placed, PlacedSequence, Placing, SkipReason, Skipped};
 pub use source::SequenceSource;
 pub use write::save;
 

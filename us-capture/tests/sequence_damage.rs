@@ -9,7 +9,9 @@ use std::time::{Duration, Instant};
 use nalgebra::Vector3;
 use probepath_frames::{Point, Probe, Span, Stamp};
 use probepath_us_capture::plus::PlusConfig;
-use probepath_us_capture::sequence::{Header, Placing, ReadOptions, Sequence, SequenceError, SequenceSource};
+use probepath_us_capture::sequence::{
+    ChainNames, Header, Placing, ReadOptions, Sequence, SequenceError, SequenceSource,
+};
 use probepath_us_capture::{BScanSource, PixelMap, PixelSpacing};
 use proptest::prelude::*;
 use proptest::sample::Index;
@@ -122,7 +124,8 @@ fn damaged(mut bytes: Vec<u8>, damage: &Damage) -> Vec<u8> {
 fn use_it(sequence: &Sequence) {
     let map = PixelMap::<Probe>::new(Point::new(0.0, 0.0, 0.0), Vector3::x() * 1e-4, Vector3::y() * 1e-4);
     for lag in [Span::ZERO, Span::from_milliseconds(-60)] {
-        let placing = Placing { reference: "Tracker".into(), lag, ..Placing::new(map) };
+        let chain = ChainNames { reference: "Tracker".into(), ..ChainNames::default() };
+        let placing = Placing { chain, lag, ..Placing::new(map) };
         if let Ok(placed) = sequence.place(&placing) {
             let skipped: usize = placed.skipped.values().sum();
             assert_eq!(placed.images.len() + skipped, sequence.images().len());

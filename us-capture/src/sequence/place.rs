@@ -6,7 +6,6 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::Arc;
 
-use nalgebra::Matrix4;
 use probepath_frames::{Image, Pose, Probe, Span, Stamp, Track, World};
 use thiserror::Error;
 
@@ -14,18 +13,15 @@ use super::{Sequence, SequenceImage, TransformName};
 use crate::plus::{PlusConfig, PlusError};
 use crate::{BScan, PixelMap, PixelSpacing, PlacedBScan, Setting};
 use chain::Chain;
+pub use chain::ChainNames;
 
 /// How the images of a sequence are placed: World is the file's reference system.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placing {
     /// Where the pixels lie in the probe's system (the spatial calibration).
     pub probe_from_pixel: PixelMap<Probe>,
-    /// Name of the probe's system in the file.
-    pub probe: String,
-    /// Name of the system that becomes World.
-    pub reference: String,
-    /// Transforms that do not change, beside those the file tracks (mm).
-    pub fixed: Vec<(TransformName, Matrix4<f64>)>,
+    /// The way from the probe to the system that becomes World.
+    pub chain: ChainNames,
     /// An image stamped t belongs to the pose at t + lag.
     pub lag: Span,
     /// Poses further apart are not interpolated between (only asked for with a lag).
@@ -37,9 +33,7 @@ impl Placing {
     pub fn new(probe_from_pixel: PixelMap<Probe>) -> Self {
         Self {
             probe_from_pixel,
-            probe: "Probe".into(),
-            reference: "Reference".into(),
-            fixed: Vec::new(),
+            chain: ChainNames::default(),
             lag: Span::ZERO,
             widest_gap: Span::from_milliseconds(1000),
         }
@@ -54,10 +48,10 @@ impl Placing {
         let image = volume.map_or("Image", |v| v.image.as_str());
         let mut placing = Self::new(config.pixels_in_probe(image, "Probe")?);
         if let Some(volume) = volume {
-            placing.reference.clone_from(&volume.reference);
+            placing.chain.reference.clone_from(&volume.reference);
         }
         let fixed = config.transforms.iter().filter(|t| t.from != image);
-        placing.fixed = fixed.map(|t| (TransformName::new(&t.from, &t.to), t.matrix_mm)).collect();
+        placing.chain.fixed = fixed.map(|t| (TransformName::new(&t.from, &t.to), t.matrix_mm)).collect();
         Ok(placing)
     }
 }
@@ -95,6 +89,9 @@ impl fmt::Display for SkipReason {
         }
     }
 }
+
+/// Where the probe was in one image, or why nobody knows.
+pub type MaybePose = Result<Pose<World, Probe>, SkipReason>;
 
 /// Images without a place, counted by reason.
 pub type Skipped = BTreeMap<SkipReason, usize>;
@@ -152,7 +149,7 @@ impl Sequence {
     /// # Errors
     /// When no chain of transforms leads from the probe to the reference.
     pub fn place(&self, placing: &Placing) -> Result<PlacedSequence, NoChain> {
-        let chain = Chain::find(self, placing)?;
+        let chain = Chain::find(self, &placing.chain)?;
         let track = (placing.lag != Span::ZERO).then(|| self.track(&chain, placing));
         let (probe_from_image, spacing) = placing.probe_from_pixel.nearest_rigid();
         let setting = setting_of(spacing, self.width, self.height);
@@ -169,6 +166,15 @@ impl Sequence {
             }
         }
         Ok(placed)
+    }
+
+    /// Where the probe was in every image, in the file's order, by the transforms tracked with it.
+    ///
+    /// # Errors
+    /// When no chain of transforms leads from the probe to the reference.
+    pub fn probe_poses(&self, names: &ChainNames) -> Result<Vec<MaybePose>, NoChain> {
+        let chain = Chain::find(self, names)?;
+        Ok(self.images.iter().map(|image| chain.pose(image)).collect())
     }
 
     fn place_one(

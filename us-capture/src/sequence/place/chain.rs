@@ -5,8 +5,26 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use nalgebra::Matrix4;
 use probepath_frames::{Pose, Probe, World};
 
-use super::{NoChain, Placing, SkipReason};
+use super::{NoChain, SkipReason};
 use crate::sequence::{Sequence, SequenceImage, TransformName};
+
+/// Which systems of a file are the probe's and the reference's, and what does not move.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ChainNames {
+    /// Name of the probe's system in the file.
+    pub probe: String,
+    /// Name of the system that becomes World.
+    pub reference: String,
+    /// Transforms that do not change, beside those the file tracks (mm).
+    pub fixed: Vec<(TransformName, Matrix4<f64>)>,
+}
+
+impl Default for ChainNames {
+    /// PLUS's usual names.
+    fn default() -> Self {
+        Self { probe: "Probe".into(), reference: "Reference".into(), fixed: Vec::new() }
+    }
+}
 
 /// One transform of the way.
 #[derive(Clone, Debug)]
@@ -25,22 +43,22 @@ pub(super) struct Chain {
 
 impl Chain {
     /// The shortest way; of equal ones the first by name.
-    pub(super) fn find(sequence: &Sequence, placing: &Placing) -> Result<Self, NoChain> {
-        let links = all_links(sequence, placing);
+    pub(super) fn find(sequence: &Sequence, names: &ChainNames) -> Result<Self, NoChain> {
+        let links = all_links(sequence, names);
         let mut came_by: BTreeMap<&str, &Link> = BTreeMap::new();
-        let mut queue = VecDeque::from([placing.probe.as_str()]);
+        let mut queue = VecDeque::from([names.probe.as_str()]);
         while let Some(here) = queue.pop_front() {
             for link in links.iter().filter(|l| l.ends().0 == here) {
                 let there = link.ends().1;
-                if there != placing.probe && !came_by.contains_key(there) {
+                if there != names.probe && !came_by.contains_key(there) {
                     came_by.insert(there, link);
                     queue.push_back(there);
                 }
             }
         }
-        walk_back(&came_by, placing).ok_or_else(|| NoChain {
-            probe: placing.probe.clone(),
-            reference: placing.reference.clone(),
+        walk_back(&came_by, names).ok_or_else(|| NoChain {
+            probe: names.probe.clone(),
+            reference: names.reference.clone(),
             there: links.iter().filter(|l| !l.inverted).map(|l| l.name.to_string()).collect(),
         })
     }
@@ -78,20 +96,20 @@ impl Link {
 }
 
 /// Every transform, both ways; tracked ones before fixed ones.
-fn all_links(sequence: &Sequence, placing: &Placing) -> Vec<Link> {
+fn all_links(sequence: &Sequence, names: &ChainNames) -> Vec<Link> {
     let tracked: BTreeSet<&TransformName> =
         sequence.images().iter().flat_map(|i| i.transforms.keys()).collect();
     let tracked = tracked.into_iter().map(|name| (name, None));
-    let fixed = placing.fixed.iter().map(|(name, matrix)| (name, Some(*matrix)));
+    let fixed = names.fixed.iter().map(|(name, matrix)| (name, Some(*matrix)));
     let both = |(name, fixed): (&TransformName, Option<Matrix4<f64>>)| {
         [false, true].map(|inverted| Link { name: name.clone(), inverted, fixed })
     };
     tracked.chain(fixed).flat_map(both).collect()
 }
 
-fn walk_back(came_by: &BTreeMap<&str, &Link>, placing: &Placing) -> Option<Chain> {
-    let (mut links, mut here) = (Vec::new(), placing.reference.as_str());
-    while here != placing.probe {
+fn walk_back(came_by: &BTreeMap<&str, &Link>, names: &ChainNames) -> Option<Chain> {
+    let (mut links, mut here) = (Vec::new(), names.reference.as_str());
+    while here != names.probe {
         let link = *came_by.get(here)?;
         links.push(link.clone());
         here = link.ends().0;
