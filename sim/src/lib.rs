@@ -57,6 +57,6 @@ pub use machine::SimulatedMachine;
 pub use phantom::{PhantomConfig, VascularPhantom};
 pub use skin::{HALF_FACE_X_M, HALF_FACE_Y_M, SkinConfig, Surface};
 pub use subject::Subject;
-pub use tissue::{Homogeneous, Reflector, Tissue};
-pub use ultrasound::{Contact, ImagingConfig, ImagingError, Renderer, Shadow, settings};
+pub use tissue::{ASSUMED_M_S, Facet, Homogeneous, Medium, Reflector, Strand, Tissue};
+pub use ultrasound::{Contact, DoubleEcho, ImagingConfig, ImagingError, Overlay, Renderer, Shadow, settings};
 pub use vessel::{Calibre, Segment, SegmentName, Stenosis, SurfaceGrid, Vessel};

@@ -5,6 +5,8 @@ mod config;
 mod display;
 mod grid;
 mod hash;
+mod overlay;
+mod reflect;
 mod scatter;
 mod section;
 pub mod settings;
@@ -13,13 +15,14 @@ use probepath_frames::{Image, Pose, World};
 use probepath_us_capture::Setting;
 use rayon::prelude::*;
 
-pub use config::{Contact, ImagingConfig, ImagingError, Shadow};
+pub use config::{Contact, DoubleEcho, ImagingConfig, ImagingError, Overlay, Shadow};
 use settings::{COLUMNS, ROWS};
 
-use crate::tissue::{Reflector, Tissue};
+use crate::tissue::{Medium, Tissue};
 use beam::Beam;
 use display::{Display, Gains};
 use grid::Grid;
+use reflect::Reflecting;
 use scatter::{ACROSS_SIGMAS, Echoes, Scattering};
 use section::{Section, Slab};
 
@@ -28,7 +31,8 @@ use section::{Section, Slab};
 /// Scatterers of random phase, one in each cube of a lattice fixed in the World, echo as strongly as the tissue there;
 /// those within the beam's thickness are summed and smeared by a point spread that is a Gaussian along the beam
 /// (always the same), across it (narrowest near the focus) and through it; then come attenuation, its compensation,
-/// electronic noise, the envelope and its logarithm. The same seed, pose and number give the same bytes, on any number
+/// electronic noise, the envelope and its logarithm. Wires and flat faces echo as a whole; in water nothing scatters,
+/// and depths are as the scanner takes them, which assumes 1540 m/s. The same seed, pose and number give the same bytes, on any number
 /// of threads.
 ///
 /// ```
@@ -94,7 +98,7 @@ impl Renderer {
             Contact::None => None,
             _ => Some(self.echoes(tissue, world_from_image, setting, (&beam, &grid))),
         };
-        let gains = Gains::new(&self.config, setting, &grid, contact, ROWS);
+        let gains = Gains::new(&self.config, setting, &grid, (tissue.medium(), contact), ROWS);
         let smear = Smear { beam: &beam, grid: &grid, setting };
         let mut pixels = vec![0_u8; COLUMNS * ROWS];
         pixels.par_chunks_mut(COLUMNS).enumerate().for_each(|(row, out)| {
@@ -106,11 +110,29 @@ impl Renderer {
             self.display.amplify([real, imaginary], &gains, (number, row));
             self.show(&smeared, grid.per_node, out);
         });
+        overlay::write(&mut pixels, &self.config.overlay, setting, number);
         Ok(pixels)
     }
 
-    /// Scatterers and reflectors, summed on the grid.
+    /// Scatterers and whatever echoes by itself, summed on the grid.
     fn echoes(
+        &self,
+        tissue: &dyn Tissue,
+        world_from_image: &Pose<World, Image>,
+        setting: &Setting,
+        (beam, grid): (&Beam, &Grid),
+    ) -> Echoes {
+        let mut echoes = match tissue.medium() {
+            Medium::Tissue => self.speckle(tissue, world_from_image, setting, (beam, grid)),
+            Medium::Water { .. } => Echoes::none(grid),
+        };
+        let reflecting = Reflecting::new((&self.config, self.seed), setting, (beam, grid), tissue.medium());
+        reflecting.all(&mut echoes, tissue, world_from_image);
+        echoes
+    }
+
+    /// Scatterers, summed on the grid.
+    fn speckle(
         &self,
         tissue: &dyn Tissue,
         world_from_image: &Pose<World, Image>,
@@ -126,13 +148,7 @@ impl Renderer {
         };
         let section = Section::new(tissue, world_from_image, &self.config, slab, self.seed);
         let numbers = (setting.window_top_m, self.config.lattice_m, self.seed);
-        let scattering = Scattering::new(grid, beam, &section, world_from_image, numbers);
-        let mut echoes = scattering.sum();
-        let image_from_world = world_from_image.inverse();
-        for Reflector { at, amplitude } in tissue.reflectors() {
-            scattering.reflect(&mut echoes, image_from_world * *at, *amplitude, setting.focus_m);
-        }
-        echoes
+        Scattering::new(grid, beam, &section, world_from_image, numbers).sum()
     }
 
     /// Envelope and logarithm, with `per_node` columns from one node to the next.

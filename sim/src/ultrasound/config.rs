@@ -49,6 +49,38 @@ pub struct ImagingConfig {
     pub dynamic_range_db: f64,
     /// Sectors behind something that swallows the beam.
     pub shadows: Vec<Shadow>,
+    /// How squarely the beam has to meet a wire: the angle (degrees) at which its echo is down to 0.61.
+    pub wire_specular_deg: f64,
+    /// And a flat face.
+    pub face_specular_deg: f64,
+    /// How unevenly a wire echoes along its length: standard deviation (dB), over about a millimetre.
+    pub wire_uneven_db: f64,
+    /// A second echo behind that of every wire.
+    pub double_echo: Option<DoubleEcho>,
+    /// What the machine writes over its picture.
+    pub overlay: Overlay,
+}
+
+/// An echo that ran to and fro in the wire, or the pulse's second swing.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DoubleEcho {
+    /// How far behind the first it shows (m).
+    pub behind_m: f64,
+    /// How much weaker it is (dB).
+    pub loss_db: f64,
+}
+
+/// What the machine writes over its picture, in white.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Overlay {
+    /// The picture's number, in digits, at the top left.
+    pub text: bool,
+    /// Marks of depth every 5 mm down the right side.
+    pub ruler: bool,
+    /// A bright bar across the first rows (rows).
+    pub bar_rows: usize,
 }
 
 /// Where echoes are lost behind a calcification or a bubble.
@@ -112,6 +144,11 @@ impl Default for ImagingConfig {
             white_db: 14.0,
             dynamic_range_db: 60.0,
             shadows: Vec::new(),
+            wire_specular_deg: 12.0,
+            face_specular_deg: 6.0,
+            wire_uneven_db: 1.0,
+            double_echo: None,
+            overlay: Overlay::default(),
         }
     }
 }
@@ -170,7 +207,13 @@ impl ImagingConfig {
         within("noise_db", self.noise_db, -300.0, 60.0)?;
         within("gain_db", self.gain_db, -60.0, 60.0)?;
         within("white_db", self.white_db, -60.0, 60.0)?;
-        within("dynamic_range_db", self.dynamic_range_db, 10.0, 120.0)
+        within("dynamic_range_db", self.dynamic_range_db, 10.0, 120.0)?;
+        within("wire_specular_deg", self.wire_specular_deg, 1.0, 90.0)?;
+        within("face_specular_deg", self.face_specular_deg, 1.0, 90.0)?;
+        within("wire_uneven_db", self.wire_uneven_db, 0.0, 20.0)?;
+        let Some(double) = self.double_echo else { return Ok(()) };
+        within("double_echo.behind_m", double.behind_m, 0.0, 20e-3)?;
+        within("double_echo.loss_db", double.loss_db, 0.0, 120.0)
     }
 }
 

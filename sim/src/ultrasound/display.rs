@@ -5,6 +5,7 @@ use probepath_us_capture::Setting;
 use super::config::{Contact, ImagingConfig};
 use super::grid::Grid;
 use super::hash;
+use crate::tissue::Medium;
 
 /// What sets the noise apart from the speckle of the same seed.
 const NOISE: u64 = 0x6e6f_6973_6521_2121;
@@ -96,12 +97,13 @@ impl Gains {
         config: &ImagingConfig,
         setting: &Setting,
         grid: &Grid,
-        contact: Contact,
+        (medium, contact): (Medium, Contact),
         rows: usize,
     ) -> Self {
+        let loss_db_cm = medium.loss_db_cm(config.attenuation_db_cm_mhz, config.frequency_mhz);
         let depth = |row: usize| setting.window_top_m + row as f64 * setting.spacing.y_m;
         // There and back: twice the depth in centimetres.
-        let lost = |row| 2.0 * config.attenuation_db_cm_mhz * config.frequency_mhz * depth(row) * 1e2;
+        let lost = |row| 2.0 * loss_db_cm * depth(row) * 1e2;
         let made_up = |row| f64::min(lost(row), config.tgc_most_db);
         let place = |node: usize| node as f64 * grid.lateral_m;
         let shadows = config.shadows.iter().map(|shadow| {

@@ -1,7 +1,7 @@
 //! The scatterers: one in each cube of a lattice fixed in the World, found again by its hash at every visit.
 
 use nalgebra::Vector3;
-use probepath_frames::{Image, Point, Pose, World};
+use probepath_frames::{Image, Pose, World};
 use rayon::prelude::*;
 
 use super::beam::Beam;
@@ -20,6 +20,13 @@ const CHUNK: usize = 48;
 pub(super) struct Echoes {
     pub(super) real: Vec<f32>,
     pub(super) imaginary: Vec<f32>,
+}
+
+impl Echoes {
+    pub(super) fn none(grid: &Grid) -> Self {
+        let size = grid.samples * grid.nodes;
+        Self { real: vec![0.0; size], imaginary: vec![0.0; size] }
+    }
 }
 
 /// Everything that stays the same from scatterer to scatterer.
@@ -76,33 +83,11 @@ impl<'a> Scattering<'a> {
 
     /// The sum of all scatterers in the slab.
     pub(super) fn sum(&self) -> Echoes {
-        let size = self.grid.samples * self.grid.nodes;
-        let mut echoes = Echoes { real: vec![0.0; size], imaginary: vec![0.0; size] };
+        let mut echoes = Echoes::none(self.grid);
         let chunk = CHUNK * self.grid.nodes;
         let parts = echoes.real.par_chunks_mut(chunk).zip(echoes.imaginary.par_chunks_mut(chunk));
         parts.enumerate().for_each(|(part, (real, imaginary))| self.chunk(part * CHUNK, real, imaginary));
         echoes
-    }
-
-    /// Adds a bright point, shared between the cells around it, so that its picture peaks at `amplitude` at the focus.
-    pub(super) fn reflect(&self, echoes: &mut Echoes, at: Point<Image>, amplitude: f64, focus_m: f64) {
-        let p = at.vector();
-        let [y0, x0] = self.grid.origin();
-        let (y, x) = ((p.y - y0) / self.grid.axial_m, (p.x - x0) / self.grid.lateral_m);
-        let inside = |t: f64, count: usize| t >= 0.0 && t < (count - 1) as f64;
-        if !(inside(y, self.grid.samples) && inside(x, self.grid.nodes)) {
-            return;
-        }
-        let fading = (-0.5 * (p.z / self.beam.elevational(self.window_top_m + p.y)).powi(2)).exp();
-        let tallest = |sigma: f64, step: f64| (step / (sigma * std::f64::consts::PI.sqrt())).sqrt();
-        let peak = tallest(self.beam.axial(), self.grid.axial_m)
-            * tallest(self.beam.lateral(focus_m), self.grid.lateral_m);
-        let (sample, node) = (y as usize, x as usize);
-        for (dy, dx) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            let part = (1.0 - (y - (sample + dy) as f64).abs()) * (1.0 - (x - (node + dx) as f64).abs());
-            echoes.real[(sample + dy) * self.grid.nodes + node + dx] +=
-                (amplitude * fading * part / peak) as f32;
-        }
     }
 
     /// All scatterers of the samples from `first` on that `real` has room for.

@@ -1,8 +1,10 @@
+mod wires;
+
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use probepath_frames::{Direction, Point};
 
 use super::*;
-use crate::tissue::Homogeneous;
+use crate::tissue::{Homogeneous, Reflector};
 use crate::{PhantomConfig, VascularPhantom};
 
 /// A plane whose first pixel is at `x`, `y`, `z` (m), its axes the World's.
