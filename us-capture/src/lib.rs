@@ -11,6 +11,7 @@ pub mod fit;
 pub mod label;
 pub mod phantom;
 mod pixel_map;
+pub mod plan;
 pub mod plus;
 pub mod sequence;
 pub mod shots;
