@@ -6,6 +6,7 @@ mod bscan;
 mod calibration;
 mod capture;
 pub mod dots;
+pub mod errors;
 pub mod exam;
 pub mod fit;
 pub mod label;
