@@ -76,6 +76,11 @@ impl<A: Frame, B: Frame, C: Clock> Track<A, B, C> {
         &self.samples
     }
 
+    /// Samples further apart than this are not interpolated between.
+    pub const fn widest_gap(&self) -> Span {
+        self.widest_gap
+    }
+
     /// First and last stamp, if there is any sample.
     pub fn span(&self) -> Option<(Stamp<C>, Stamp<C>)> {
         Some((self.samples.first()?.0, self.samples.last()?.0))

@@ -10,6 +10,7 @@ pub mod errors;
 pub mod exam;
 pub mod fit;
 pub mod label;
+pub mod lag;
 pub mod phantom;
 mod pixel_map;
 pub mod plan;
