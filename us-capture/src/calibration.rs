@@ -244,7 +244,7 @@ impl SettingMm {
 
 /// Metres as millimetres that read back to the same metres where any double does: 0.07 m is 70 mm, though the product
 /// of the doubles is 70.00000000000001.
-fn mm(metres: f64) -> f64 {
+pub(crate) fn mm(metres: f64) -> f64 {
     let product = metres * 1e3;
     let neighbours = [product, product.next_up(), product.next_down()];
     neighbours.into_iter().find(|mm| (mm / 1e3).to_bits() == metres.to_bits()).unwrap_or(product)

@@ -105,9 +105,10 @@ fn linear(node: Node<'_, '_>) -> Result<bool, PlusError> {
     }
 }
 
-/// `CompoundingMode`; files before PLUS 2.4 say `Compounding="ON"` for the mean.
+/// `CompoundingMode`; files before PLUS 2.4 say `Compounding="ON"` (or `"On"`) for the mean.
 fn compounding(node: Node<'_, '_>) -> Result<PlusCompounding, PlusError> {
-    match (node.attribute("CompoundingMode"), node.attribute("Compounding")) {
+    let word = |name| node.attribute(name).map(str::to_ascii_uppercase);
+    match (word("CompoundingMode").as_deref(), word("Compounding").as_deref()) {
         (Some("MEAN"), _) | (None, Some("ON")) => Ok(PlusCompounding::Mean),
         (Some("MAXIMUM"), _) => Ok(PlusCompounding::Maximum),
         (Some("LATEST"), _) | (None, Some("OFF") | None) => Ok(PlusCompounding::Latest),
@@ -115,7 +116,12 @@ fn compounding(node: Node<'_, '_>) -> Result<PlusCompounding, PlusError> {
     }
 }
 
-fn clip(node: Node<'_, '_>) -> Result<Option<Rectangle>, PlusError> {
+/// A part of the image. PLUS writes negative numbers for "all of it".
+pub(super) fn clip(node: Node<'_, '_>) -> Result<Option<Rectangle>, PlusError> {
+    let negative = |name| matches!(numbers::<i64>(node, name, 2), Ok(Some(n)) if n.iter().any(|x| *x < 0));
+    if negative("ClipRectangleOrigin") || negative("ClipRectangleSize") {
+        return Ok(None);
+    }
     let origin = numbers::<usize>(node, "ClipRectangleOrigin", 2)?;
     let size = numbers::<usize>(node, "ClipRectangleSize", 2)?;
     match (origin.as_deref(), size.as_deref()) {

@@ -66,6 +66,6 @@ pub(super) fn bad(node: Node<'_, '_>, attribute: &str, why: impl Into<String>) -
     PlusError::BadAttribute { line: line(node), attribute: attribute.into(), value, why: why.into() }
 }
 
-fn line(node: Node<'_, '_>) -> u32 {
+pub(super) fn line(node: Node<'_, '_>) -> u32 {
     node.document().text_pos_at(node.range().start).row
 }
