@@ -70,7 +70,6 @@ pub struct Landmark {
 
 /// A phantom of wires.
 #[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
 pub struct WirePhantom {
     /// Its name; a calibration is stored with it.
     pub name: String,
