@@ -23,6 +23,7 @@
 //! - [`Path`] is what was taught, cleaned of approach, lifts, pauses, doubling back and tremor: poses at uniform spacing.
 //! - [`Plan`] is the whole replay tried out before anything moves: reach, limits, singularities, workspace, speed.
 //! - [`Replay`] is the controller that follows a plan at constant force; [`LiftOff`] takes the probe off after a stop.
+//! - [`Round`] is the controller that goes from stop to stop in free air or water and rests at each.
 //!
 //! It knows nothing of ultrasound, and does not find its way on skin that moved since it was taught further than the
 //! plan's offset along the probe's axis.
@@ -36,6 +37,7 @@ mod probe_arm;
 mod recorder;
 mod recording;
 mod replay;
+mod round;
 
 pub use error::PathError;
 pub use hand_guide::{GiveWay, GuideError, HandGuide};
@@ -48,3 +50,4 @@ pub use probe_arm::ProbeArm;
 pub use recorder::Recorder;
 pub use recording::{Recording, Sample};
 pub use replay::{Replay, ReplayEnding, ReplayError, ReplayPhase, ReplaySettings, ReplayStatus, ReplayWatch};
+pub use round::{Round, RoundPhase, RoundStatus, RoundWatch, Stop};

@@ -10,7 +10,7 @@ use probepath_robot::{ContactSettings, InverseOptions, Joints, Plane, Workspace}
 
 use crate::probe_arm::along_z;
 use crate::{Path, ProbeArm};
-pub(crate) use approach::Leg;
+pub(crate) use approach::{Leg, legs};
 pub use refusal::{Place, PlanError, Refusal};
 
 /// Part of what the path leaves that the contact uses: the joints' slopes differ a little on the way down.
@@ -107,7 +107,7 @@ impl Plan {
             .model
             .inverse(&goal, &arm.flange_from_probe, start, &InverseOptions::default())
             .map_err(|why| PlanError::new(Place::Standoff, Refusal::Unreachable(why)))?;
-        let legs = approach::legs(arm, settings, start, &above)?;
+        let legs = legs(arm, settings, start, &above)?;
         let mut tour = Tour { arm, settings, report: EMPTY, axial: Joints::zeros(start.len()) };
         let postures = tour.along(curve, path.spacing(), &above)?;
         let timing =
@@ -211,9 +211,16 @@ fn refuse_crawling(report: &PlanReport, settings: &PlanSettings) -> Result<(), P
 }
 
 /// The first plane of the workspace that a point lies beyond, and by how much (m).
-fn outside(workspace: &Workspace, point: &Point<Base>) -> Option<(usize, f64)> {
+pub(crate) fn outside(workspace: &Workspace, point: &Point<Base>) -> Option<(usize, f64)> {
     let beyond = |plane: &Plane| (plane.through.vector() - point.vector()).dot(&plane.inward.vector());
     workspace.planes().iter().map(beyond).enumerate().find(|(_, beyond)| *beyond > 0.0)
+}
+
+/// The first joint that is nearer than `least` to a limit, by name, and how near (rad, m).
+pub(crate) fn too_near_to_a_limit(arm: &ProbeArm, joints: &Joints, least: f64) -> Option<(String, f64)> {
+    let left = |i: usize| (joints[i] - arm.limits.lower[i]).min(arm.limits.upper[i] - joints[i]);
+    let joint = (0..joints.len()).find(|i| left(*i) < least)?;
+    Some((arm.model.joint_names().get(joint).cloned().unwrap_or_default(), left(joint)))
 }
 
 /// The way along the path, posture after posture.
@@ -295,13 +302,12 @@ impl Tour<'_> {
             if left < self.report.least_margin.0 {
                 self.report.least_margin = (left, s);
             }
-            if left < self.settings.joint_margin {
-                let name = self.arm.model.joint_names().get(joint).cloned().unwrap_or_default();
-                let least = self.settings.joint_margin;
-                return Err(PlanError::new(place, Refusal::JointLimit { joint: name, left, least }));
-            }
         }
-        Ok(())
+        let least = self.settings.joint_margin;
+        let found = too_near_to_a_limit(self.arm, joints, least);
+        found.map_or(Ok(()), |(joint, left)| {
+            Err(PlanError::new(place, Refusal::JointLimit { joint, left, least }))
+        })
     }
 
     /// Tracking failed: is there any posture at all?

@@ -29,7 +29,7 @@ pub(crate) struct Leg {
 }
 
 impl Leg {
-    fn new(
+    pub(crate) fn new(
         arm: &ProbeArm,
         from: &Joints,
         to: &Joints,
@@ -49,7 +49,7 @@ impl Leg {
     }
 
     /// How long it takes (s), ramps left out.
-    pub(super) fn duration_s(&self) -> f64 {
+    pub(crate) fn duration_s(&self) -> f64 {
         self.motion.duration_s() / self.pace
     }
 
@@ -89,7 +89,7 @@ fn look(
 }
 
 /// The legs from `start` to `above`; none when it is there already.
-pub(super) fn legs(
+pub(crate) fn legs(
     arm: &ProbeArm,
     settings: &PlanSettings,
     start: &Joints,

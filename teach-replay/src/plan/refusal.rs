@@ -35,6 +35,11 @@ pub enum Place {
     },
     /// Over the beginning of the path.
     Standoff,
+    /// A stop of a round; counted from 1.
+    Stop {
+        /// Which.
+        stop: usize,
+    },
     /// On the path.
     Path {
         /// Distance along it (mm).
@@ -55,6 +60,7 @@ impl fmt::Display for Place {
         match self {
             Self::Start => write!(f, "before the start"),
             Self::Approach { leg } => write!(f, "approach, part {leg} of 3 (up, over, down)"),
+            Self::Stop { stop } => write!(f, "stop {stop} of the round"),
             Self::Standoff => write!(f, "over the beginning of the path"),
             Self::Path { at_mm, offset_mm } if offset_mm.abs() < 1e-9 => {
                 write!(f, "{at_mm:.1} mm along the path")
