@@ -27,10 +27,10 @@ pub struct Stop {
     pub speed_m_s: f64,
     /// Whether what is seen on the way there counts.
     pub look_on_the_way: bool,
-    /// How long it rests there (s).
-    pub rest_s: f64,
-    /// Whether what is seen there counts.
-    pub look_at_rest: bool,
+    /// How long it rests there before what is seen counts (s).
+    pub settle_s: f64,
+    /// How long it rests there while what is seen counts (s).
+    pub look_s: f64,
 }
 
 /// One stop with the way there.
@@ -156,8 +156,11 @@ impl Round {
 
     /// How long it takes (s), without pauses.
     pub fn duration_s(&self) -> f64 {
-        let of =
-            |planned: &Planned| planned.stop.rest_s + planned.legs.iter().map(Leg::duration_s).sum::<f64>();
+        let of = |planned: &Planned| {
+            planned.stop.settle_s
+                + planned.stop.look_s
+                + planned.legs.iter().map(Leg::duration_s).sum::<f64>()
+        };
         self.stops.iter().map(of).sum()
     }
 
@@ -195,7 +198,8 @@ impl Round {
         }
         self.last = planned.joints;
         // The limiter wants the target thrice to be at rest.
-        Stage::Resting { stop, ticks: 3 + (planned.stop.rest_s / self.dt).round() as u64 }
+        let rest_s = planned.stop.settle_s + planned.stop.look_s;
+        Stage::Resting { stop, ticks: 3 + (rest_s / self.dt).round() as u64 }
     }
 
     const fn next(&self, stop: usize) -> Stage {
@@ -203,15 +207,16 @@ impl Round {
     }
 
     fn tell(&self) {
-        let look = |stop: usize, at_rest: bool| {
-            let stop = self.stops.get(stop).map(|planned| planned.stop);
-            stop.is_some_and(|stop| if at_rest { stop.look_at_rest } else { stop.look_on_the_way })
+        let stop_of = |stop: usize| self.stops.get(stop).map(|planned| planned.stop);
+        let looks = |stop: usize, ticks: u64| {
+            stop_of(stop).is_some_and(|s| s.look_s > 0.0 && ticks as f64 * self.dt <= s.look_s)
         };
         let (phase, stop) = match self.stage {
-            Stage::Going { stop, .. } if look(stop, false) => (RoundPhase::Sweeping, stop),
-            Stage::Going { stop, .. } => (RoundPhase::Going, stop),
-            Stage::Resting { stop, .. } if look(stop, true) => (RoundPhase::Looking, stop),
-            Stage::Resting { stop, .. } => (RoundPhase::Going, stop),
+            Stage::Going { stop, .. } if stop_of(stop).is_some_and(|s| s.look_on_the_way) => {
+                (RoundPhase::Sweeping, stop)
+            }
+            Stage::Resting { stop, ticks } if looks(stop, ticks) => (RoundPhase::Looking, stop),
+            Stage::Going { stop, .. } | Stage::Resting { stop, .. } => (RoundPhase::Going, stop),
             Stage::Done => (RoundPhase::Done, self.stops.len()),
         };
         self.board.write(phase, stop);

@@ -153,6 +153,11 @@ impl Capture {
         Ok(())
     }
 
+    /// Listens to the machine from now on: that nobody did before is no silence of its.
+    pub const fn listen(&mut self, now: Stamp) {
+        self.heard = Some(now);
+    }
+
     /// Takes every B-scan that has arrived by `now`.
     ///
     /// # Errors

@@ -107,8 +107,10 @@ pub struct VisitOptions {
     pub turn_rad: f64,
     /// Wires that have to lie in the window at each pose.
     pub least_wires: usize,
-    /// What the face keeps above the highest wire (m).
+    /// What the face keeps above the highest wire (m): more than the plates stand out.
     pub clearance_m: f64,
+    /// How far above the highest wire the face may be (m): less than the water stands there.
+    pub highest_m: f64,
     /// Half the size of the probe's face, housing included: along the array and across it (m).
     pub half_face_m: [f64; 2],
     /// Expected standard deviation of a dot along a row and along a column (m).
@@ -152,6 +154,7 @@ impl Default for VisitOptions {
             turn_rad: 10f64.to_radians(),
             least_wires: 6,
             clearance_m: 5e-3,
+            highest_m: 50e-3,
             half_face_m: [0.025, 0.006],
             dot_sd_m: [0.15e-3, 0.08e-3],
             pose_sd_m: 0.1e-3,
@@ -205,7 +208,7 @@ pub struct Refused {
     pub considered: usize,
     /// Too few wires in the window.
     pub too_few_wires: usize,
-    /// The face would come too near to the wires.
+    /// The face would come too near to the wires, or too far above them.
     pub too_near: usize,
     /// Not reachable, of those that would have been chosen.
     pub unreachable: usize,
@@ -215,7 +218,7 @@ impl fmt::Display for Refused {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "of {} poses {} show too few wires, at {} the face comes too near to the wires, {} cannot be reached",
+            "of {} poses {} show too few wires, at {} the face comes too near to the wires or too far above them, {} cannot be reached",
             self.considered, self.too_few_wires, self.too_near, self.unreachable
         )
     }
@@ -321,6 +324,7 @@ impl VisitOptions {
             ("turn_deg", self.turn_rad.to_degrees(), 0.0, 45.0, "0 to 45 degrees"),
             ("least_wires", self.least_wires as f64, 3.0, 100.0, "3 to 100"),
             ("clearance_mm", self.clearance_m * 1e3, 0.0, 100.0, "0 to 100 mm"),
+            ("highest_mm", self.highest_m * 1e3, self.clearance_m * 1e3, 1000.0, "clearance_mm to 1000 mm"),
             ("dot_sd_mm (along a row)", self.dot_sd_m[0] * 1e3, 1e-3, 5.0, "0.001 to 5 mm"),
             ("dot_sd_mm (along a column)", self.dot_sd_m[1] * 1e3, 1e-3, 5.0, "0.001 to 5 mm"),
             ("pose_sd_mm", self.pose_sd_m * 1e3, 1e-4, 10.0, "0.0001 to 10 mm"),

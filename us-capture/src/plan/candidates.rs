@@ -109,7 +109,7 @@ impl<'a> Candidates<'a> {
         clear
     }
 
-    /// Whether every corner of the face is above the highest wire.
+    /// Whether every corner of the face is as far above the highest wire as it has to be, and no farther.
     pub(super) fn is_clear(&self, pose: &Pose<World, Probe>) -> bool {
         let ([x, y], stand) = (self.options.half_face_m, &self.stand);
         let height = |corner: Point<Probe>| {
@@ -117,7 +117,8 @@ impl<'a> Candidates<'a> {
             -off.dot(&stand.axes.column(1)) - stand.top
         };
         let corners = [(x, y), (x, -y), (-x, y), (-x, -y)].map(|(x, y)| Point::new(x, y, 0.0));
-        corners.into_iter().all(|corner| height(corner) >= self.options.clearance_m)
+        let allowed = self.options.clearance_m..=self.options.highest_m;
+        corners.into_iter().all(|corner| allowed.contains(&height(corner)))
     }
 
     /// Whether the pose shows enough and is clear, nothing counted.
