@@ -15,6 +15,7 @@ pub mod phantom;
 mod pixel_map;
 pub mod plan;
 pub mod plus;
+pub mod pointer;
 pub mod sequence;
 pub mod shots;
 mod source;
