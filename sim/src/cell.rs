@@ -4,6 +4,7 @@ mod config;
 mod error;
 mod nominal;
 mod scene;
+mod touch;
 mod truth;
 
 use std::fmt;
@@ -16,6 +17,7 @@ pub use error::CellError;
 pub use nominal::Nominal;
 pub use scene::Moment;
 pub(crate) use scene::{Scene, Shared};
+pub use touch::Touch;
 pub use truth::Truth;
 
 use crate::arm::SimulatedArm;
@@ -68,7 +70,7 @@ impl SimulatedCell {
     pub fn new(config: &CellConfig, seed: u64) -> Result<Self, CellError> {
         config.check()?;
         let nominal = Nominal::new(config)?;
-        let subject = Arc::new(Subject::new(&config.subject, seed));
+        let subject = Arc::new(Subject::new(&config.subject, seed)?);
         let scene = Shared::new(Scene::new(config, nominal.clone(), subject.clone(), seed)?);
         let truth = Truth::new(config, &nominal, &subject, &scene, seed);
         let renderer = Arc::new(Renderer::new(config.machine.imaging.clone(), seed)?);

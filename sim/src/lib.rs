@@ -25,7 +25,8 @@
 //! # Ok::<(), probepath_sim::CellError>(())
 //! ```
 //!
-//! The nouns: a [`Vessel`] is a tube with an exact lumen; a [`Leg`] or a [`VascularPhantom`] is skin and vessels;
+//! The nouns: a [`Vessel`] is a tube with an exact lumen; a [`Leg`] or a [`VascularPhantom`] is skin and vessels, a
+//! [`WireTank`] a calibration phantom in water;
 //! [`Tissue`] is what the beam meets, and a [`Renderer`] makes the B-scan of it.
 //!
 //! What it does not do: know any algorithm under test. It leans on none, and its truth goes to tests and reports only.
@@ -41,6 +42,7 @@ mod random;
 mod skin;
 mod spline;
 mod subject;
+mod tank;
 mod tissue;
 mod ultrasound;
 mod vessel;
@@ -48,7 +50,7 @@ mod vessel;
 pub use arm::{KinematicError, SensorConfig, SimulatedArm};
 pub use cell::{
     ArmConfig, ArmKind, CellConfig, CellError, MachineConfig, Moment, Nominal, SimulatedCell, SimulatedHand,
-    SubjectConfig, TICK, Truth, Window,
+    SubjectConfig, TICK, Touch, Truth, Window,
 };
 pub use hand::HandConfig;
 pub use knobs::{ArmKnobs, Interval, Knobs, MachineKnobs, Ticks};
@@ -57,6 +59,7 @@ pub use machine::SimulatedMachine;
 pub use phantom::{PhantomConfig, VascularPhantom};
 pub use skin::{HALF_FACE_X_M, HALF_FACE_Y_M, SkinConfig, Surface};
 pub use subject::Subject;
+pub use tank::{Bench, WirePhantomConfig, WireTank};
 pub use tissue::{ASSUMED_M_S, Facet, Homogeneous, Medium, Reflector, Strand, Tissue};
 pub use ultrasound::{Contact, DoubleEcho, ImagingConfig, ImagingError, Overlay, Renderer, Shadow, settings};
 pub use vessel::{Calibre, Segment, SegmentName, Stenosis, SurfaceGrid, Vessel};

@@ -33,7 +33,7 @@ pub(super) fn surface_error(truth: &Truth, recon: &LumenReconstruction) -> Optio
 
 /// Distances of the grid's points (mm), but for rows that no image shows: those only bridge a gap.
 fn error_map(truth: &Truth, recon: &LumenReconstruction) -> Option<Vec<f64>> {
-    let vessel = truth.subject().main();
+    let vessel = truth.subject().main()?;
     let (from, until) = reach(vessel, recon)?;
     let rings = (((until - from) / RING_M).ceil() as usize).max(2);
     let grid = vessel.surface(from..until, rings, AROUND);
@@ -54,7 +54,7 @@ fn reach(vessel: &Vessel, recon: &LumenReconstruction) -> Option<(f64, f64)> {
 
 /// Every true stenosis that lies whole inside the reconstruction, beside what was found.
 pub(super) fn stenoses(truth: &Truth, recon: &LumenReconstruction) -> Vec<StenosisError> {
-    let vessel = truth.subject().main();
+    let Some(vessel) = truth.subject().main() else { return Vec::new() };
     let Some((from, until)) = reach(vessel, recon) else { return Vec::new() };
     let covered = (from + BEYOND_M, until - BEYOND_M);
     let inside = |s: &&probepath_sim::Stenosis| {

@@ -96,6 +96,11 @@ impl TrueChain {
         self.output = self.output.zip(motors, |output, motor| output.clamp(motor - play, motor + play));
         self.output
     }
+
+    /// Motors that are anywhere in their play when the joints have come to `reached`.
+    pub(crate) fn motors(&self, reached: &Joints, stream: &mut Stream) -> Joints {
+        each(reached, |q| q + self.half_play * stream.uniform(-1.0, 1.0))
+    }
 }
 
 impl Blueprint<'_> {

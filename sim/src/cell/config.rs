@@ -9,6 +9,7 @@ use crate::knobs::Knobs;
 use crate::leg::LegConfig;
 use crate::phantom::PhantomConfig;
 use crate::skin::SkinConfig;
+use crate::tank::{self, WirePhantomConfig};
 use crate::ultrasound::ImagingConfig;
 
 /// A simulated cell. The default is a UR5e beside the table with a left leg on it.
@@ -39,6 +40,8 @@ pub enum SubjectConfig {
     Leg(LegConfig),
     /// The straight vascular phantom of [P1].
     Phantom(PhantomConfig),
+    /// A phantom of wires in water, for calibrating.
+    WirePhantom(WirePhantomConfig),
 }
 
 impl Default for SubjectConfig {
@@ -159,6 +162,26 @@ impl CellConfig {
         }
     }
 
+    /// The calibration bench of [P1]: its 19 Zs in a tank of water at 20 degrees, depth 7 cm, focus 4-5 cm, no zoom.
+    /// The machine's gain suits water: bright wires over faint noise. What the software knows of the image's plane is
+    /// a drawing of the holder, 3 mm and 3 degrees from the truth; what the probe knocks against is hard.
+    pub fn wire_phantom() -> Self {
+        let imaging = ImagingConfig { noise_db: 1.0, dynamic_range_db: 50.0, ..ImagingConfig::default() };
+        let machine = MachineConfig {
+            window: Window::Whole,
+            calibration_error_mm: 3.0,
+            calibration_error_deg: 3.0,
+            imaging,
+            ..MachineConfig::default()
+        };
+        Self {
+            subject: SubjectConfig::WirePhantom(WirePhantomConfig::default()),
+            skin: SkinConfig { gel_mm: 0.0, ..SkinConfig::even(20.0) },
+            machine,
+            ..Self::default()
+        }
+    }
+
     /// Whether every number can be what it says.
     pub(super) fn check(&self) -> Result<(), CellError> {
         let (arm, machine, skin, hand) = (&self.arm, &self.machine, &self.skin, &self.hand);
@@ -189,6 +212,9 @@ impl CellConfig {
         within("hand.press_n", hand.press_n, 0.5, 30.0)?;
         within("hand.unsteadiness", hand.unsteadiness, 0.0, 10.0)?;
         machine.check()?;
+        if let SubjectConfig::WirePhantom(wires) = &self.subject {
+            tank::refuse(wires, within)?;
+        }
         self.knobs.check()
     }
 }

@@ -1,6 +1,7 @@
 //! Why there is no cell.
 
 use probepath_robot::{ModelError, NoInverse};
+use probepath_us_capture::phantom::BadPhantom;
 use thiserror::Error;
 
 use crate::ultrasound::ImagingError;
@@ -33,8 +34,20 @@ pub enum CellError {
     /// The ultrasound machine's pictures cannot be made as machine.imaging says.
     #[error("the cell's machine.imaging cannot be")]
     Imaging(#[from] ImagingError),
-    /// The start posture, over the leg, is not reached.
-    #[error("the arm does not reach its start posture over the table")]
+    /// There is no such wire phantom.
+    #[error(
+        "the cell's wire phantom is named {named:?}; name one that ships ({shipped}) or a phantom's file"
+    )]
+    Phantom {
+        /// What the configuration says.
+        named: String,
+        /// What ships.
+        shipped: String,
+        /// Why it could not be read.
+        source: Box<BadPhantom>,
+    },
+    /// The start posture over the table, or one with the pointer in a landmark, is not reached.
+    #[error("the arm does not reach where it has to over the table")]
     Start(#[from] NoInverse),
 }
 

@@ -8,6 +8,7 @@ use probepath_us_capture::Setting;
 use super::config::{ArmKind, CellConfig, MachineConfig, SubjectConfig, Window};
 use super::{CellError, TICK};
 use crate::leg::Side;
+use crate::tank::Bench;
 use crate::ultrasound::settings;
 
 /// What the software may know about the cell: what a real cell's file would say, errors included.
@@ -31,6 +32,8 @@ pub struct Nominal {
     pub period: Span,
     /// Where the arm is found: the probe over the groin (or over the phantom), looking down.
     pub start: Joints,
+    /// The wire phantom, where one is on the table.
+    pub bench: Option<Bench>,
     model: Model,
 }
 
@@ -52,6 +55,10 @@ impl Nominal {
             setting: config.machine.setting(),
             period: TICK,
             start: arm.near,
+            bench: match &config.subject {
+                SubjectConfig::WirePhantom(wires) => Some(Bench::new(wires)?),
+                _ => None,
+            },
             model: arm.model,
         };
         let over = looking_down(Vector3::new(side * aside, -0.30, 0.0));

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use probepath_frames::{Pose, Probe, Stamp, Twist, World, Wrench};
-use probepath_robot::{JointLimit, Joints};
+use probepath_robot::{JointLimit, Joints, Model};
 
 use super::config::{ArmConfig, CellConfig};
 use super::nominal::Nominal;
@@ -125,9 +125,9 @@ impl Scene {
         (joints, self.nominal.world_from_base * base_from_probe)
     }
 
-    /// A hand takes the probe.
+    /// A hand takes the probe, where there is a vessel to guide it along.
     pub(crate) fn guide(&mut self, config: &HandConfig) {
-        let vessel = self.subject.main();
+        let Some(vessel) = self.subject.main() else { return };
         let from_m = self.subject.origin_m() + config.start_mm * 1e-3;
         let length_m = (config.length_mm * 1e-3).min(vessel.length_m() - from_m);
         let course = Course::over(&*self.subject, &self.skin, vessel, from_m, length_m);
@@ -231,8 +231,25 @@ impl Scene {
         Some(before.world_from_probe.interpolate(&self.moments.get(index + 1)?.world_from_probe, fraction))
     }
 
-    /// Where gel joins the face to the skin, along the probe's x (m).
+    /// The chain as it was truly built.
+    pub(crate) const fn true_model(&self) -> &Model {
+        &self.chain.model
+    }
+
+    /// Where the motors may be when the joints have come to `reached` from any side.
+    pub(crate) fn motors_that_reach(&self, reached: &Joints, stream: &mut Stream) -> Joints {
+        self.chain.motors(reached, stream)
+    }
+
+    pub(crate) const fn encoder_noise_rad(&self) -> f64 {
+        self.config.position_noise_rad
+    }
+
+    /// Where gel joins the face to the skin, or water to all that is under it, along the probe's x (m).
     pub(crate) fn touched(&self, world_from_probe: &Pose<World, Probe>) -> Option<(f64, f64)> {
+        if let Some(tank) = self.subject.tank() {
+            return tank.wet(world_from_probe);
+        }
         self.skin.touched(&*self.subject, world_from_probe)
     }
 }

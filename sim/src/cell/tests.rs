@@ -2,6 +2,7 @@
 
 mod guided;
 mod press;
+mod wires;
 
 use nalgebra::Vector3;
 use probepath_frames::{Pose, Probe, World};
@@ -250,7 +251,7 @@ fn the_surface_that_the_skin_lies_on_is_the_subjects() {
 
 #[test]
 fn a_configuration_goes_to_a_file_and_back() {
-    for config in [CellConfig::default(), CellConfig::phantom()] {
+    for config in [CellConfig::default(), CellConfig::phantom(), CellConfig::wire_phantom()] {
         let text = toml::to_string(&config).unwrap();
         assert_eq!(toml::from_str::<CellConfig>(&text).unwrap(), config);
     }

@@ -2,15 +2,16 @@
 
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
-use probepath_frames::{Image, Pose, Probe, Span, Stamp, World};
-use probepath_us_capture::Setting;
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use probepath_frames::{Image, Phantom, Pose, Probe, Span, Stamp, World};
+use probepath_us_capture::{PixelSpacing, Setting};
 
 use super::config::CellConfig;
 use super::nominal::Nominal;
 use super::scene::{Moment, Shared};
 use crate::random::Stream;
 use crate::subject::Subject;
+use crate::tissue::Tissue;
 
 /// What was truly there. For tests and for `validate`; the code under test never sees it.
 #[derive(Clone, Debug)]
@@ -54,6 +55,29 @@ impl Truth {
     /// Where the B-scan's plane truly is on the probe.
     pub fn probe_from_image(&self, setting: &Setting) -> Pose<Probe, Image> {
         self.probe_from_image_error * self.nominal.probe_from_image(setting)
+    }
+
+    /// The same as the echoes show it: where the plane and its pixels truly are when sound is slower on its way than
+    /// the scanner assumes. In tissue it is `probe_from_image` and the setting's spacing; in water rows are closer
+    /// together, and the first one, half a pixel under the window's top, is less deep.
+    pub fn seen_from_image(&self, setting: &Setting) -> (Pose<Probe, Image>, PixelSpacing) {
+        let deep_per_m = 1.0 / self.subject.medium().shown_per_m();
+        let over_m = setting.window_top_m + setting.spacing.y_m / 2.0;
+        let up = Translation3::new(0.0, over_m * (deep_per_m - 1.0), 0.0);
+        // FRAMES: the same axes, from the face down: the first row's centre is only so deep.
+        let nearer = Pose::<Image, Image>::assume(Isometry3::from_parts(up, UnitQuaternion::identity()));
+        let spacing = PixelSpacing { x_m: setting.spacing.x_m, y_m: setting.spacing.y_m * deep_per_m };
+        (self.probe_from_image(setting) * nearer, spacing)
+    }
+
+    /// Where the wire phantom truly stands, where there is one.
+    pub fn world_from_phantom(&self) -> Option<Pose<World, Phantom>> {
+        self.subject.tank().map(|tank| *tank.world_from_phantom())
+    }
+
+    /// An image stamped t belongs to the pose at t + lag.
+    pub fn lag(&self) -> Span {
+        Span::from_nanoseconds(self.nominal.image_latency.nanoseconds() - self.image_latency.nanoseconds())
     }
 
     /// How long a B-scan truly takes to arrive.

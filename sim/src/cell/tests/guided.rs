@@ -92,7 +92,7 @@ fn the_hand_guides_the_arm_along_the_leg_as_a_person_would() {
 
 /// The artery stays under the probe: within a third of the picture's width of its middle.
 fn off_the_artery(cell: &SimulatedCell, on_skin: &[&Moment]) {
-    let main = cell.subject().main();
+    let main = cell.subject().main().unwrap();
     let aside: Vec<f64> = on_skin
         .iter()
         .step_by(50)
