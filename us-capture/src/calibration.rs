@@ -1,5 +1,7 @@
 //! [`Calibration`]: where the image's plane is in the probe, for one setting of the machine, with its error.
 
+mod quality;
+
 use std::fs;
 use std::path::Path;
 use std::sync::Arc;
@@ -9,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::{PixelSpacing, Setting};
+pub use quality::{Covariance, DepthMm, ErrorsMm, FoundMm, PromisedMm, Quality, RepeatabilityMm, Water};
 
 /// Settings that differ by less than this (m) are the same: a file prints what a machine rounds.
 const SAME_LENGTH_M: f64 = 1e-6;
@@ -34,6 +37,8 @@ pub struct Calibration {
     pub image_lag: Span,
     /// How good it is.
     pub error: CalibrationError,
+    /// All that is known of that; `None` for a calibration that nobody fitted, or of an older file.
+    pub quality: Option<Quality>,
 }
 
 /// How good a calibration is.
@@ -79,6 +84,12 @@ pub enum BadCalibration {
         /// What would do.
         wanted: &'static str,
     },
+    /// The covariance is none.
+    #[error("the calibration's covariance: {why}")]
+    Covariance {
+        /// What is wrong.
+        why: String,
+    },
     /// The machine is set differently.
     #[error(
         "calibration {id} belongs to another setting: {differences}; \
@@ -100,6 +111,9 @@ struct Layout {
     date: String,
     phantom: String,
     image_lag_ms: f64,
+    // Before the sections that have to be there: a file that is cut short is never read as one without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    quality: Option<Quality>,
     probe_from_image: NamedPose,
     setting: SettingMm,
     error: CalibrationError,
@@ -134,6 +148,7 @@ impl Calibration {
             date: layout.date,
             phantom: layout.phantom,
             error: layout.error,
+            quality: layout.quality,
         };
         calibration.check_numbers()?;
         Ok(calibration)
@@ -149,6 +164,7 @@ impl Calibration {
             id: self.id.clone(),
             date: self.date.clone(),
             phantom: self.phantom.clone(),
+            quality: self.quality.clone(),
             image_lag_ms: self.image_lag.nanoseconds() as f64 / 1e6,
             probe_from_image: NamedPose::from(&self.probe_from_image),
             setting: SettingMm::of(&self.setting),
@@ -201,7 +217,7 @@ impl Calibration {
         for (field, found) in [("error.rms_mm", self.error.rms_mm), ("error.sd_mm", self.error.sd_mm)] {
             check(found >= 0.0 && found.is_finite(), field, found, "zero or more")?;
         }
-        Ok(())
+        self.quality.as_ref().map_or(Ok(()), Quality::check)
     }
 }
 

@@ -108,3 +108,6 @@ pub struct LagFound {
     /// Images that disagreed with all others, and were left out.
     pub outliers: usize,
 }
+
+#[cfg(test)]
+mod tests;

@@ -19,10 +19,12 @@ pub mod pointer;
 pub mod sequence;
 pub mod shots;
 mod source;
-pub mod spatial;
 
 pub use bscan::{BScan, BadBScan, PixelSpacing, PlacedBScan, Setting};
-pub use calibration::{BadCalibration, Calibration, CalibrationError};
+pub use calibration::{
+    BadCalibration, Calibration, CalibrationError, Covariance, DepthMm, ErrorsMm, FoundMm, PromisedMm,
+    Quality, RepeatabilityMm, Water,
+};
 pub use capture::{Capture, CaptureError, Counts, Keeping};
 pub use pixel_map::{BadPixelMap, PixelMap};
 pub use source::{BScanSource, SourceFault};

@@ -171,6 +171,7 @@ impl Cell {
                 sd_mm: 0.0,
                 held_out: false,
             },
+            quality: None,
         };
         Ok(Self {
             file: file.clone(),

@@ -23,6 +23,7 @@ fn calibration() -> Calibration {
         },
         image_lag: Span::from_nanoseconds(-64_800_000),
         error: CalibrationError { rms_mm: 0.6, sd_mm: 0.38, held_out: true },
+        quality: None,
     }
 }
 
@@ -31,6 +32,75 @@ fn what_is_written_is_what_is_read() {
     let text = calibration().to_toml().unwrap();
     assert_eq!(Calibration::from_toml(&text).unwrap(), calibration(), "{text}");
     assert!(text.contains("depth_mm = 70.0") && text.contains("image_lag_ms = -64.8"), "{text}");
+}
+
+fn quality() -> Quality {
+    let errors = ErrorsMm {
+        mids: 300,
+        mid_mean95_mm: Some(0.5),
+        mid_sd95_mm: Some(0.2),
+        mid_rms_mm: Some(0.61),
+        lines: 900,
+        line_rms_mm: 0.3,
+    };
+    Quality {
+        software: "probepath 0.1.0".into(),
+        images: 188,
+        dots: 1692,
+        standard_error: PromisedMm { mean_mm: 0.1, p95_mm: 0.2 },
+        found: Some(FoundMm {
+            held_out: true,
+            all: errors,
+            depths: vec![DepthMm {
+                from_mm: 20.0,
+                to_mm: 30.0,
+                errors: ErrorsMm { mid_rms_mm: None, ..errors },
+            }],
+        }),
+        repeatability: Some(RepeatabilityMm { calibrations: 10, points: 600, c_rms_mm: 0.4, mean_mm: 0.35 }),
+        water: Some(Water { temperature_celsius: 20.0, speed_of_sound_m_s: 1482.3, assumed_m_s: 1540.0 }),
+        covariance: Some(Covariance {
+            parameters: vec!["image_turn_x".into(), "lag".into()],
+            units: vec!["rad".into(), "s".into()],
+            rows: vec![vec![1e-6, -3e-7], vec![-3e-7, 4e-6]],
+        }),
+    }
+}
+
+fn known_well() -> Calibration {
+    Calibration { quality: Some(quality()), ..calibration() }
+}
+
+#[test]
+fn all_that_is_known_of_it_is_written_and_read() {
+    let text = known_well().to_toml().unwrap();
+    assert_eq!(Calibration::from_toml(&text).unwrap(), known_well(), "{text}");
+    let covariance = quality().covariance.unwrap();
+    assert_eq!(covariance.about(&["lag", "image_turn_y"]), nalgebra::dmatrix![4e-6, 0.0; 0.0, 0.0]);
+}
+
+#[test]
+fn a_quality_that_cannot_be_is_refused_with_the_reason() {
+    let good = known_well().to_toml().unwrap();
+    let cases = [
+        ("p95_mm = 0.2", "p95_mm = nan", "quality.standard_error.p95_mm"),
+        ("p95_mm = 0.2", "p95_m = 0.0002", "p95_m"),
+        ("line_rms_mm = 0.3", "line_rms_mm = -0.3", "quality.found"),
+        ("temperature_celsius = 20.0", "temperature_celsius = 293.0", "temperature_celsius"),
+        ("speed_of_sound_m_s = 1482.3", "speed_of_sound_m_s = 1.48", "speed_of_sound_m_s"),
+        ("\"lag\"", "\"image_turn_x\"", "twice"),
+        ("\"s\"", "\"ms\"", "\"ms\""),
+        ("[0.000001, -0.0000003]", "[0.000001]", "square"),
+        ("[0.000001, -0.0000003]", "[0.000001, 0.0000003]", "the other way round"),
+        ("[0.000001, -0.0000003]", "[nan, -0.0000003]", "variance of image_turn_x"),
+        ("0.0000003", "0.000003", "eigenvalue"),
+    ];
+    for (from, to, named) in cases {
+        let text = good.replace(from, to);
+        assert_ne!(text, good, "{from} in {good}");
+        let message = Calibration::from_toml(&text).unwrap_err().to_string();
+        assert!(message.contains(named), "{to}: {message}");
+    }
 }
 
 #[test]
@@ -72,10 +142,12 @@ fn a_bad_calibration_is_refused_with_the_field() {
 
 #[test]
 fn a_file_cut_anywhere_is_refused_or_whole() {
-    let good = calibration().to_toml().unwrap();
-    for end in 0..good.len() {
-        if let Ok(read) = Calibration::from_toml(&good[..end]) {
-            assert_eq!(read, calibration(), "cut at {end}");
+    for whole in [calibration(), known_well()] {
+        let good = whole.to_toml().unwrap();
+        for end in 0..good.len() {
+            if let Ok(read) = Calibration::from_toml(&good[..end]) {
+                assert_eq!(read, whole, "cut at {end}");
+            }
         }
     }
 }

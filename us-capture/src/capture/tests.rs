@@ -42,6 +42,7 @@ fn calibration(lag_ms: i64) -> Calibration {
         setting: SETTING,
         image_lag: Span::from_milliseconds(lag_ms),
         error: CalibrationError { rms_mm: 0.5, sd_mm: 0.3, held_out: true },
+        quality: None,
     }
 }
 

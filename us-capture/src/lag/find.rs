@@ -14,10 +14,12 @@ const LEAST_PLANE_PX: f64 = 3.0;
 const FEWEST_POSES: usize = 10;
 /// The scan's step (s): a fraction of any hand's or arm's quickest motion.
 const STEP_S: f64 = 0.01;
+/// Step of the first, robust scan (s).
+const ROBUST_STEP_S: f64 = 0.02;
 /// Residuals beyond so many robust standard deviations belong to another line.
 const OUTLIER: f64 = 6.0;
-/// A lag is as good as the best unless it is so much less likely (log of the likelihoods' ratio, three sigma).
-const AS_GOOD: f64 = 4.5;
+/// A lag is as good as the best unless it is so much less likely (log of the likelihoods' ratio, four sigma).
+const AS_GOOD: f64 = 8.0;
 /// Part of the velocity's power that has to be told apart from noise.
 const LEAST_TOLD_APART: f64 = 0.3;
 
@@ -37,17 +39,10 @@ pub fn lag_of(
     let (zero, mut rows) = rows_of(signal, options)?;
     let images = rows.len();
     let motion = motion_of(&rows, poses, zero, options)?;
-    let (scan, best) = loop {
-        let scan =
-            Scan::run(&motion, &rows, options).ok_or_else(|| no_overlap(&rows, poses, zero, options))?;
-        let best = scan.best;
-        let kept = agreeing(&rows, &best);
-        if kept.len() == rows.len() || kept.len() * 3 < images * 2 {
-            break (scan.lags, best);
-        }
-        rows = kept;
-    };
-    believable(&scan, &best, options)?;
+    let scanned = scan_all(&motion, &mut rows, options);
+    let scan = scanned.ok_or_else(|| no_overlap(&rows, poses, zero, options))?;
+    let best = &scan.best;
+    believable(&scan.lags, best, options)?;
     let fewest = options.fewest_images;
     let uncertain = |lag_s| NoLag::TooUncertain {
         lag_s,
@@ -151,21 +146,61 @@ struct Best {
 impl Scan {
     /// `None` when no lag has half of the images inside the poses.
     fn run(motion: &Motion, rows: &[Row], options: &LagOptions) -> Option<Self> {
-        let fewest = options.fewest_images.max(rows.len() / 2);
-        let most = options.most_lag.seconds().abs();
-        let steps = (most / STEP_S).ceil() as i64;
-        let mut lags = Vec::new();
+        let mut tried = Vec::new();
         let mut best: Option<Best> = None;
-        for step in -steps..=steps {
-            let lag_s = step as f64 * STEP_S;
-            let Some(regression) = regress(motion, rows, lag_s, fewest) else { continue };
-            lags.push((lag_s, regression.explained));
+        for lag_s in lags(options, STEP_S) {
+            let Some(regression) = regress(motion, rows, lag_s, fewest(rows, options)) else { continue };
+            tried.push((lag_s, regression.explained));
             if best.as_ref().is_none_or(|b| regression.explained > b.regression.explained) {
                 best = Some(Best { lag_s, regression });
             }
         }
-        Some(Self { lags, best: best? })
+        Some(Self { lags: tried, best: best? })
     }
+}
+
+/// The scan of those images that agree with its best lag; the others are taken out. `None` when no lag has half of
+/// the images inside the poses.
+fn scan_all(motion: &Motion, rows: &mut Vec<Row>, options: &LagOptions) -> Option<Scan> {
+    let images = rows.len();
+    let mut best = robust_scan(motion, rows, options)?;
+    loop {
+        let kept = agreeing(rows, &best);
+        let settled = kept.len() == rows.len() || kept.len() * 3 < images * 2;
+        if !settled {
+            *rows = kept;
+        }
+        let scan = Scan::run(motion, rows, options)?;
+        if settled {
+            return Some(scan);
+        }
+        best = scan.best;
+    }
+}
+
+/// The lag that leaves least in three quarters of the images, by least absolute residuals: images that show another line do not lead it away.
+fn robust_scan(motion: &Motion, rows: &[Row], options: &LagOptions) -> Option<Best> {
+    let mut best: Option<(f64, Best)> = None;
+    for lag_s in lags(options, ROBUST_STEP_S) {
+        let regression = regress(motion, rows, lag_s, fewest(rows, options));
+        let Some(regression) = regression.and_then(|r| r.least_absolute(rows)) else { continue };
+        let left = regression.upper_quartile_px();
+        if best.as_ref().is_none_or(|(least, _)| left < *least) {
+            best = Some((left, Best { lag_s, regression }));
+        }
+    }
+    best.map(|(_, best)| best)
+}
+
+/// Half of the images have to lie inside the poses.
+fn fewest(rows: &[Row], options: &LagOptions) -> usize {
+    options.fewest_images.max(rows.len() / 2)
+}
+
+/// The lags to try.
+fn lags(options: &LagOptions, step_s: f64) -> impl Iterator<Item = f64> {
+    let steps = (options.most_lag.seconds().abs() / step_s).ceil() as i64;
+    (-steps..=steps).map(move |step| step as f64 * step_s)
 }
 
 /// The rows without those that the best lag leaves far out.

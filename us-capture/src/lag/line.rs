@@ -80,7 +80,7 @@ pub fn find_line(
         let contrast_grey = options.contrast_grey;
         return Err(NoLine::Dark { columns: with_echo, needed, contrast_grey });
     }
-    let all: Vec<Echo> = found.into_iter().flatten().collect();
+    let all = capped(found);
     let middle = width as f64 / 2.0;
     let first = brightest(&all, middle, height);
     let (on_it, rest) = first.split(&all);
@@ -91,10 +91,19 @@ pub fn find_line(
     }
     let second = brightest(&rest, middle, height);
     let rival = Support::of(&second.split(&rest).0);
-    if rival.brightness() > 0.9 * support.brightness() {
+    let (brightness, columns) = (0.9 * support.brightness(), 0.7 * support.columns() as f64);
+    if rival.brightness() > brightness && rival.columns() as f64 > columns {
         return Err(NoLine::TwoLines { first_row: first.row, second_row: second.row });
     }
     through(&support).ok_or(scattered)
+}
+
+/// All echoes, none brighter than half again the usual best one of a column: a few bright spots are no line.
+fn capped(found: Vec<Vec<Echo>>) -> Vec<Echo> {
+    let mut best: Vec<f64> = found.iter().filter_map(|f| Some(f.first()?.contrast)).collect();
+    best.sort_by(f64::total_cmp);
+    let cap = 1.5 * best.get(best.len() / 2).copied().unwrap_or_default();
+    found.into_iter().flatten().map(|e| Echo { contrast: e.contrast.min(cap), ..e }).collect()
 }
 
 #[cfg(test)]

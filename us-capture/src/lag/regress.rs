@@ -45,12 +45,12 @@ pub(super) fn regress(motion: &Motion, rows: &[Row], lag_s: f64, fewest: usize) 
         return None;
     }
     let design = design.resize_vertically(used.len(), 1.0);
-    solve(rows, used, design)
+    let weights = DVector::from_iterator(used.len(), used.iter().map(|i| rows[*i].weight));
+    solve(rows, used, design, &weights)
 }
 
-fn solve(rows: &[Row], used: Vec<usize>, design: DMatrix<f64>) -> Option<Regression> {
+fn solve(rows: &[Row], used: Vec<usize>, design: DMatrix<f64>, weights: &DVector<f64>) -> Option<Regression> {
     let y = DVector::from_iterator(used.len(), used.iter().map(|i| rows[*i].position));
-    let weights = DVector::from_iterator(used.len(), used.iter().map(|i| rows[*i].weight));
     let mut weighted = design.clone();
     for (mut row, w) in weighted.row_iter_mut().zip(weights.iter()) {
         row *= *w;
@@ -72,6 +72,24 @@ fn solve(rows: &[Row], used: Vec<usize>, design: DMatrix<f64>) -> Option<Regress
 }
 
 impl Regression {
+    /// The same images with the least sum of absolute residuals instead of squares (iteratively reweighted): a tenth
+    /// of the images may show another line.
+    pub fn least_absolute(mut self, rows: &[Row]) -> Option<Self> {
+        for _ in 0..8 {
+            let floor = 0.1 * self.residuals.lp_norm(1) / self.used.len() as f64 + 1e-9;
+            let weights = self.residuals.map(|e| 1.0 / e.abs().max(floor));
+            self = solve(rows, self.used, self.design, &weights)?;
+        }
+        Some(self)
+    }
+
+    /// The upper quartile of the absolute residuals (px): what is left, whatever the worst quarter of the images shows.
+    pub fn upper_quartile_px(&self) -> f64 {
+        let mut sizes: Vec<f64> = self.residuals.iter().map(|e| e.abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        sizes.get(sizes.len() * 3 / 4).copied().unwrap_or_default()
+    }
+
     /// What of `signal` (one value a used image) no place and direction of the plane explains.
     pub fn beyond(&self, rows: &[Row], signal: &DVector<f64>) -> DVector<f64> {
         let weighted = DVector::from_iterator(

@@ -32,7 +32,8 @@ pub(super) fn standard_error(motion: &Motion, rows: &[Row], fine: &Fine) -> Opti
     let images = fine.regression.used.iter().zip(fine.beyond.iter()).zip(fine.regression.residuals.iter());
     let scores: Vec<f64> = images.map(|((i, v), e)| rows[*i].weight * v * e).collect();
     let free = n - fine.regression.coefficients.len() as f64 - 1.0;
-    let variance = n * long_run_variance(&scores) * (n / free.max(1.0)) / power.powi(2);
+    // Residuals are smaller than errors by their leverage; twice for its part in their products (HC3, on the average).
+    let variance = n * long_run_variance(&scores) * (n / free.max(1.0)).powi(2) / power.powi(2);
     let standard_error_s = variance.max(0.0).sqrt() / told_apart.clamp(0.05, 1.0);
     Some(Uncertainty { standard_error_s, told_apart })
 }
