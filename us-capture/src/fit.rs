@@ -132,16 +132,16 @@ pub fn fit(
 ) -> Result<Fit, FitError> {
     options.check()?;
     let mut problem = problem::Problem::new(phantom, sightings, track, options)?;
-    let start = match start {
-        Some(pose) if pose.is_finite() => pose,
+    let (pose, lag) = match start {
+        Some(pose) if pose.is_finite() => (pose, options.lag.start()),
         Some(_) => {
             return Err(FitError::Option { field: "start", found: f64::NAN, wanted: "finite numbers" });
         }
         None => linear_start(phantom, sightings, track, options)?,
     };
-    let mut values = parameters::Values::start(&start, options);
-    if let Lag::Estimated { from, to } = options.lag {
-        values = lag_scan::scan(&mut problem, &values, (from.seconds(), to.seconds()))?;
+    let mut values = parameters::Values::start(&pose, lag, options);
+    if let Lag::Estimated { .. } = options.lag {
+        values = lag_scan::scan(&mut problem, &values, options.lag)?;
     }
     let values = solve::settle(&mut problem, values)?;
     uncertainty::conclude(&problem, &values, options)

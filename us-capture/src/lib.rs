@@ -19,6 +19,7 @@ pub mod pointer;
 pub mod sequence;
 pub mod shots;
 mod source;
+pub mod spatial;
 
 pub use bscan::{BScan, BadBScan, PixelSpacing, PlacedBScan, Setting};
 pub use calibration::{

@@ -7,8 +7,9 @@ use thiserror::Error;
 
 use crate::sequence::{ChainNames, MaybePose, NoChain, Sequence, SkipReason};
 
-/// Poses further apart than this are not interpolated between: a freehand probe has been anywhere meanwhile.
-const WIDEST_GAP: Span = Span::from_milliseconds(1000);
+/// Poses further apart than this many of the usual steps are not interpolated between: a freehand probe has been
+/// anywhere meanwhile.
+const WIDEST_GAP_STEPS: i64 = 4;
 /// How far apart images without stamps are put.
 const UNSTAMPED_STEP: Span = Span::from_milliseconds(1000);
 
@@ -142,12 +143,23 @@ impl Shots {
     }
 }
 
+/// By the median step from stamp to stamp.
+fn widest_gap(shots: &[Shot]) -> Span {
+    let mut steps: Vec<i64> = shots.windows(2).map(|w| (w[1].stamp - w[0].stamp).nanoseconds()).collect();
+    let middle = steps.len() / 2;
+    if steps.is_empty() {
+        return Span::ZERO;
+    }
+    let (_, median, _) = steps.select_nth_unstable(middle);
+    Span::from_nanoseconds(median.saturating_mul(WIDEST_GAP_STEPS).max(0))
+}
+
 type Lost = Vec<(u64, SkipReason)>;
 
 /// The poses that may be used by their stamps. Repeated stamps and steps back are left out: of two poses for one
 /// instant nobody knows the right one.
 fn track_of(shots: &[Shot], poses: Vec<MaybePose>) -> Result<(Track<World, Probe>, Lost), BadShots> {
-    let (mut track, mut lost) = (Track::new(WIDEST_GAP), Lost::new());
+    let (mut track, mut lost) = (Track::new(widest_gap(shots)), Lost::new());
     for (shot, pose) in shots.iter().zip(poses) {
         match pose {
             Ok(pose) => {

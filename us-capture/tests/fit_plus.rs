@@ -1,5 +1,8 @@
 //! The fit and the errors on PLUS's own dots, stamps and poses (`../shared/data/plus/*.results.xml`).
 
+#![expect(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
+#![allow(clippy::print_stderr, reason = "a skipped test is seen, and so is what was found")]
+
 #[path = "support/plus_results.rs"]
 mod plus_results;
 
@@ -15,10 +18,7 @@ use probepath_us_capture::fit::{FitOptions, PhantomPlace, fit};
 fn plus() -> Option<PathBuf> {
     let folder = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/plus"));
     if !folder.is_dir() {
-        #[allow(clippy::print_stderr, reason = "a skipped test is seen")]
-        {
-            eprintln!("skipped: no folder ../shared/data/plus");
-        }
+        eprintln!("skipped: no folder ../shared/data/plus");
         return None;
     }
     Some(folder)

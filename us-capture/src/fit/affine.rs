@@ -18,19 +18,20 @@ const SHEAR_LIMIT_RAD: f64 = 0.45;
 /// A pixel whose size is wrong by more than this factor is of another depth, or in another unit.
 const SIZE_LIMIT: f64 = 1.6;
 
-/// The affine map that fits best, outliers weighed down.
-pub(super) fn solve(pairs: &[Pair]) -> Result<PixelMap<Probe>, FitError> {
+/// The affine map that fits best, outliers weighed down, and what it leaves of a pair that is none (m).
+pub(super) fn solve(pairs: &[Pair]) -> Result<(PixelMap<Probe>, f64), FitError> {
     let mut weights = vec![1.0; pairs.len()];
-    let mut map = weighted(pairs, &weights)?;
+    let (mut map, mut left) = (weighted(pairs, &weights)?, 0.0);
     for _ in 0..ROUNDS {
         let off = |(at, point): &Pair| (map.at(at[0], at[1]).vector() - point).norm_squared();
         let squared: Vec<f64> = pairs.iter().map(off).collect();
         let sigma = scale(&mut squared.clone(), 6).unwrap_or(0.0).max(1e-6);
+        left = sigma;
         let weight = |s: &f64| Robust::Cauchy(2.0).cost(s / (sigma * sigma)).1;
         weights = squared.iter().map(weight).collect();
         map = weighted(pairs, &weights)?;
     }
-    Ok(map)
+    Ok((map, left))
 }
 
 fn weighted(pairs: &[Pair], weights: &[f64]) -> Result<PixelMap<Probe>, FitError> {

@@ -44,7 +44,7 @@ impl Information {
     ) -> Result<Self, FitError> {
         options.check()?;
         let mut problem = Problem::new(phantom, sightings, track, options)?;
-        let values = Values::start(&probe_from_image, options);
+        let values = Values::start(&probe_from_image, options.lag.start(), options);
         problem.weigh_as_said(&values)?;
         let whole = solve::normal(&problem, &values).ok_or(FitError::Diverged)?.square;
         let prior = Square::from_diagonal(&problem.prior);

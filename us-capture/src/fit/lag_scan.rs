@@ -5,7 +5,7 @@
 
 use super::parameters::{LAG, Values};
 use super::problem::Problem;
-use super::{FitError, solve};
+use super::{FitError, Lag, solve};
 
 /// From one lag to the next (s).
 const GRID_S: f64 = 0.05;
@@ -14,19 +14,24 @@ const IMAGES: usize = 60;
 /// Steps of a calibration at one lag; it starts from the neighbour's.
 const STEPS: usize = 6;
 
-/// The values at the best lag of the grid.
-pub(super) fn scan(
-    problem: &mut Problem<'_>,
-    start: &Values,
-    (from_s, to_s): (f64, f64),
-) -> Result<Values, FitError> {
-    let mut few = thinned(problem);
+/// The lags to try, in order: the one that is known, or a grid over those that are possible.
+pub(super) fn grid(lag: Lag) -> Vec<f64> {
+    let (from_s, to_s) = match lag {
+        Lag::Known(lag) => return vec![lag.seconds()],
+        Lag::Estimated { from, to } => (from.seconds(), to.seconds()),
+    };
     let count = ((to_s - from_s) / GRID_S).ceil().max(1.0) as usize;
-    let grid: Vec<f64> = (0..=count).map(|k| from_s + (to_s - from_s) * k as f64 / count as f64).collect();
-    let middle = grid.partition_point(|lag| *lag < 0.0).min(count);
+    (0..=count).map(|k| from_s + (to_s - from_s) * k as f64 / count as f64).collect()
+}
+
+/// The values at the best lag of the grid; from the start's lag outward, each from its neighbour.
+pub(super) fn scan(problem: &mut Problem<'_>, start: &Values, lag: Lag) -> Result<Values, FitError> {
+    let mut few = thinned(problem);
+    let grid = grid(lag);
+    let (before, after) = grid.split_at(grid.partition_point(|lag| *lag < start.lag_s));
     let mut found = Vec::with_capacity(grid.len());
     let mut trouble = None;
-    for lags in [grid[middle..].to_vec(), grid[..middle].iter().rev().copied().collect()] {
+    for lags in [after.to_vec(), before.iter().rev().copied().collect()] {
         let mut values = *start;
         for lag_s in lags {
             match at(&mut few, &Values { lag_s, ..values }) {
@@ -56,11 +61,11 @@ fn thinned<'a>(problem: &Problem<'a>) -> Problem<'a> {
 }
 
 fn at(few: &mut Problem<'_>, values: &Values) -> Result<Values, FitError> {
-    few.weigh(values, 0.0)?;
+    few.weigh(values)?;
     let values = solve::descend(few, values, STEPS)?;
-    few.weigh(&values, 0.0)?;
+    few.weigh(&values)?;
     let values = solve::descend(few, &values, STEPS)?;
-    few.weigh(&values, 0.0)?;
+    few.weigh(&values)?;
     Ok(values)
 }
 
@@ -69,7 +74,7 @@ fn best(few: &mut Problem<'_>, found: &[(f64, Values)]) -> Option<Values> {
     let least = found.iter().map(|(sigma, _)| *sigma).min_by(f64::total_cmp)?;
     let mut best: Option<(f64, Values)> = None;
     for (_, values) in found {
-        if few.weigh(values, 0.0).is_err() {
+        if few.weigh(values).is_err() {
             continue;
         }
         few.sigma = least;

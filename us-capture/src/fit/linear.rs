@@ -1,11 +1,15 @@
 //! A start for the fit: linear from the Zs' middle wires, or from planes that labels alone gave.
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use probepath_frames::{Image, Phantom, Point, Pose, Probe, Stamp, Track, World};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use probepath_frames::{Image, Phantom, Point, Pose, Probe, Span, Stamp, Track, World};
 
 use super::affine::{self, Pair};
-use super::{FitError, FitOptions, Lag, Sighting, motion};
+use super::{FitError, FitOptions, Sighting, lag_scan, motion};
+use crate::PixelMap;
 use crate::phantom::{WirePhantom, ZFiducial};
+
+/// Pairs of a pixel and a point that a linear solution needs.
+const LEAST_PAIRS: usize = 6;
 
 /// The middle wire's point in the phantom by the ratio of the image: from the crossing with the first side to the
 /// crossing with the last, a part `h = |first - middle| / |first - last|` of the way ([P1] eq. 2-4). `None` when the
@@ -39,8 +43,8 @@ fn crossing(phantom: &WirePhantom, on: usize, other: usize) -> Option<Vector3<f6
     Some(on.front.vector() + along * reach)
 }
 
-/// Where the image's plane about is, from the middle wires of the Zs: a linear problem, outliers weighed down, made
-/// rigid. The lag is taken as known, or as none.
+/// Where the image's plane about is, and the lag, from the middle wires of the Zs: at every lag of a grid a linear
+/// problem, outliers weighed down; the one that leaves least, made rigid.
 ///
 /// # Errors
 /// When there are too few Zs with all three dots, their middles lie on one line, or the solution is far from rigid.
@@ -49,52 +53,82 @@ pub fn linear_start(
     sightings: &[Sighting],
     track: &Track<World, Probe>,
     options: &FitOptions,
-) -> Result<Pose<Probe, Image>, FitError> {
-    let pairs = pairs(phantom, sightings, track, options);
-    if pairs.len() < 6 {
-        let why = format!(
-            "{} Zs were seen whole while the track had a pose, 6 are needed; the phantom has {} Zs. Give a start, or \
-             label more images",
-            pairs.len(),
-            phantom.zs.len()
-        );
-        return Err(FitError::NoStart { why });
+) -> Result<(Pose<Probe, Image>, Span), FitError> {
+    let seen: Vec<Seen> = sightings.iter().filter_map(|s| Seen::of(phantom, s)).collect();
+    let mut best: Option<Linear> = None;
+    let mut trouble = None;
+    for lag_s in lag_scan::grid(options.lag) {
+        match Linear::at(&seen, track, options, lag_s) {
+            Ok(found) if best.as_ref().is_none_or(|best| found.left_m < best.left_m) => best = Some(found),
+            Ok(_) => {}
+            Err(error) => trouble = Some(error),
+        }
     }
-    let count = pairs.len() as f64;
-    let middle = [0, 1].map(|k| pairs.iter().map(|(at, _)| at[k]).sum::<f64>() / count);
-    let scales = options.start_scale();
-    let mut spacing = options.spacing;
-    (spacing.x_m, spacing.y_m) = (spacing.x_m * scales.0, spacing.y_m * scales.1);
-    affine::nearest_pose(&affine::solve(&pairs)?, spacing, middle)
+    let best = best.ok_or_else(|| trouble.unwrap_or_else(|| too_few(0)))?;
+    Ok((
+        affine::nearest_pose(&best.map, options.start_spacing(), best.middle_px)?,
+        Span::from_seconds(best.lag_s),
+    ))
 }
 
-fn pairs(
-    phantom: &WirePhantom,
-    sightings: &[Sighting],
-    track: &Track<World, Probe>,
-    options: &FitOptions,
-) -> Vec<Pair> {
-    let world_from_phantom = *options.place.pose().isometry();
-    let lag_s = known_lag_s(options);
-    let mut pairs = Vec::new();
-    for sighting in sightings {
-        let Some(world_from_probe) = motion::pose(track, sighting.stamp, lag_s) else { continue };
-        let probe_from_phantom = world_from_probe.inverse() * world_from_phantom;
-        let seen = phantom.zs.iter().filter_map(|z| middle_point(phantom, z, sighting));
-        pairs.extend(
-            seen.map(|(at, point)| {
-                (at, (probe_from_phantom * nalgebra::Point3::from(point.vector())).coords)
-            }),
-        );
-    }
-    pairs
+/// The Zs that an image saw whole: a middle dot, and its place in the phantom.
+struct Seen {
+    stamp: Stamp,
+    middles: Vec<([f64; 2], Point<Phantom>)>,
 }
 
-fn known_lag_s(options: &FitOptions) -> f64 {
-    match options.lag {
-        Lag::Known(lag) => lag.seconds(),
-        Lag::Estimated { from, to } => 0.0_f64.clamp(from.seconds(), to.seconds()),
+impl Seen {
+    fn of(phantom: &WirePhantom, sighting: &Sighting) -> Option<Self> {
+        let middles: Vec<_> = phantom.zs.iter().filter_map(|z| middle_point(phantom, z, sighting)).collect();
+        (!middles.is_empty()).then_some(Self { stamp: sighting.stamp, middles })
     }
+}
+
+/// The linear solution at one lag.
+struct Linear {
+    map: PixelMap<Probe>,
+    left_m: f64,
+    lag_s: f64,
+    middle_px: [f64; 2],
+}
+
+impl Linear {
+    fn at(
+        seen: &[Seen],
+        track: &Track<World, Probe>,
+        options: &FitOptions,
+        lag_s: f64,
+    ) -> Result<Self, FitError> {
+        let place = *options.place.pose().isometry();
+        let (mut pairs, mut covered): (Vec<Pair>, _) = (Vec::new(), 0);
+        for image in seen {
+            let Some(world_from_probe) = motion::pose(track, image.stamp, lag_s) else { continue };
+            covered += 1;
+            let probe_from_phantom = world_from_probe.isometry().inverse() * place;
+            let in_probe =
+                |point: &Point<Phantom>| (probe_from_phantom * Point3::from(point.vector())).coords;
+            pairs.extend(image.middles.iter().map(|(at, point)| (*at, in_probe(point))));
+        }
+        // A lag that leaves most images without a pose would win with what is left.
+        if 2 * covered < seen.len() {
+            return Err(FitError::OutsideTrack { inside: covered, images: seen.len(), lag_s });
+        }
+        if pairs.len() < LEAST_PAIRS {
+            return Err(too_few(pairs.len()));
+        }
+        let count = pairs.len() as f64;
+        let middle_px = [0, 1].map(|k| pairs.iter().map(|(at, _)| at[k]).sum::<f64>() / count);
+        let (map, left_m) = affine::solve(&pairs)?;
+        Ok(Self { map, left_m, lag_s, middle_px })
+    }
+}
+
+fn too_few(seen: usize) -> FitError {
+    let why = format!(
+        "{seen} Zs were seen whole while the track had a pose, {LEAST_PAIRS} are needed; give a start where the \
+         phantom has no Zs, or label more images"
+    );
+    FitError::NoStart { why }
 }
 
 /// Where the image's plane about is, from planes that each image's labels gave alone: the one in the middle, outliers
@@ -107,10 +141,10 @@ pub fn start_from_planes(
     track: &Track<World, Probe>,
     options: &FitOptions,
 ) -> Result<Pose<Probe, Image>, FitError> {
-    let (place, lag_s) = (*options.place.pose().isometry(), known_lag_s(options));
+    let (place, lag_s) = (*options.place.pose().isometry(), options.lag.start().seconds());
     let one = |(stamp, plane): &(Stamp, Pose<Phantom, Image>)| {
         let world_from_probe = motion::pose(track, *stamp, lag_s)?;
-        Some(world_from_probe.inverse() * place * plane.isometry())
+        Some(world_from_probe.isometry().inverse() * place * plane.isometry())
     };
     let found: Vec<Isometry3<f64>> = planes.iter().filter_map(one).collect();
     if found.len() < 3 {

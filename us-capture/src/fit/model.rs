@@ -2,7 +2,8 @@
 
 use nalgebra::{Isometry3, Matrix2, Matrix2x3, Matrix3, Matrix3x2, Vector2, Vector3};
 
-use super::motion::Moment;
+use probepath_frames::{Probe, Twist};
+
 use super::parameters::{
     COLUMN_SCALE, LAG, PLACE_SHIFT, PLACE_TURN, ROW_SCALE, SHEAR, SHIFT, Step, TURN, Values,
 };
@@ -108,11 +109,11 @@ impl<'a> Chain<'a> {
     }
 
     /// The vector from the wire and its derivatives by every parameter.
-    pub(super) fn row(&self, at_px: [f64; 2], wire: &WireLine, moment: &Moment) -> Row {
+    pub(super) fn row(&self, at_px: [f64; 2], wire: &WireLine, twist: &Twist<Probe>) -> Row {
         let in_image = self.in_image(at_px);
         let in_probe = self.in_probe(&in_image);
         let in_phantom = self.in_phantom(&in_probe);
-        let velocity = moment.linear + moment.angular.cross(&in_probe);
+        let velocity = twist.linear + twist.angular.cross(&in_probe);
         let by_probe = wire.across * self.turn;
         let by_image = by_probe * self.image_turn;
         let by = [0, 1].map(|k| {

@@ -89,6 +89,16 @@ pub enum Robust {
     Cauchy(f64),
 }
 
+impl Lag {
+    /// What is known, or none where that is possible.
+    pub(super) fn start(self) -> Span {
+        match self {
+            Self::Known(lag) => lag,
+            Self::Estimated { from, to } => Span::ZERO.clamp(from, to.max(from)),
+        }
+    }
+}
+
 impl PhantomPlace {
     /// About there, to 0.5 mm and 0.5 degrees: what landmarks touched with a pointer are good for.
     pub fn prior(pose: Pose<World, Phantom>) -> Self {
@@ -125,6 +135,12 @@ impl FitOptions {
                 (1.0, speed_of_sound_in_water(water_celsius) / assumed_m_s)
             }
         }
+    }
+
+    /// The size of a pixel to start from.
+    pub(super) fn start_spacing(&self) -> PixelSpacing {
+        let (columns, rows) = self.start_scale();
+        PixelSpacing { x_m: self.spacing.x_m * columns, y_m: self.spacing.y_m * rows }
     }
 
     /// How well the factor of the rows is known; infinite for not at all.

@@ -1,9 +1,9 @@
 //! The parameters of the fit: their names, their values, and a step of them.
 
 use nalgebra::{Isometry3, SVector, Translation3, UnitQuaternion, Vector3};
-use probepath_frames::{Image, Pose, Probe};
+use probepath_frames::{Image, Pose, Probe, Span};
 
-use super::{FitOptions, Lag};
+use super::FitOptions;
 use crate::PixelSpacing;
 
 /// All that can be fitted; what is not, keeps its place and is left out of the solving.
@@ -78,17 +78,14 @@ pub(super) struct Values {
 }
 
 impl Values {
-    pub(super) fn start(probe_from_image: &Pose<Probe, Image>, options: &FitOptions) -> Self {
+    pub(super) fn start(probe_from_image: &Pose<Probe, Image>, lag: Span, options: &FitOptions) -> Self {
         let (column_scale, row_scale) = options.start_scale();
         Self {
             probe_from_image: *probe_from_image.isometry(),
             column_scale,
             row_scale,
             shear: 0.0,
-            lag_s: match options.lag {
-                Lag::Known(lag) => lag.seconds(),
-                Lag::Estimated { .. } => 0.0,
-            },
+            lag_s: lag.seconds(),
             place_turn: UnitQuaternion::identity(),
             place_shift: Vector3::zeros(),
         }

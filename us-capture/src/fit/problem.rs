@@ -4,8 +4,9 @@ use nalgebra::{Matrix2, SMatrix, Vector2, Vector3};
 use probepath_frames::{Probe, Stamp, Track, World};
 
 use super::model::{Chain, Stand, WireLine};
+use super::motion::Moment;
 use super::parameters::{COLUMN_SCALE, COUNT, LAG, PLACE_SHIFT, PLACE_TURN, ROW_SCALE, SHEAR, Step, Values};
-use super::{FitError, FitOptions, Lag, PhantomPlace, Robust, Scale, Sighting, motion, robust};
+use super::{FitError, FitOptions, Lag, PhantomPlace, Robust, Scale, Sighting, robust};
 use crate::PixelSpacing;
 use crate::phantom::WirePhantom;
 
@@ -21,7 +22,6 @@ pub(super) struct Problem<'a> {
     pub(super) images: Vec<ImageDots>,
     pub(super) wires: Vec<WireLine>,
     pub(super) track: &'a Track<World, Probe>,
-    pub(super) half_step_s: f64,
     pub(super) nominal: PixelSpacing,
     pub(super) stand: Stand,
     pub(super) active: [bool; COUNT],
@@ -32,6 +32,9 @@ pub(super) struct Problem<'a> {
     pub(super) robust: Robust,
     /// How many times larger errors are than the covariances say.
     pub(super) sigma: f64,
+    /// The lag at which dots were weighed. Near it the probe goes on as it moves there: a descent along the track
+    /// itself would stop in every dent that a tracker's trembling makes.
+    lag_s: f64,
 }
 
 /// One image's dots.
@@ -41,6 +44,8 @@ pub(super) struct ImageDots {
     pub(super) dots: Vec<WeighedDot>,
     /// The track covers it.
     pub(super) inside: bool,
+    /// Where the probe was at the lag at which dots were weighed, and how it moved.
+    pub(super) moment: Moment,
 }
 
 /// A dot, with what turns its error into standard deviations.
@@ -82,7 +87,6 @@ impl<'a> Problem<'a> {
         let problem = Self {
             images: sightings.iter().map(|s| image(s, phantom)).collect::<Result<_, _>>()?,
             wires: lines(phantom)?,
-            half_step_s: motion::half_step_s(track),
             track,
             nominal: options.spacing,
             stand: stand(phantom, options),
@@ -92,6 +96,7 @@ impl<'a> Problem<'a> {
             floor_m: options.floor_m,
             robust: options.robust,
             sigma: 1.0,
+            lag_s: 0.0,
         };
         problem.check_enough(problem.images.iter().filter(|i| !i.dots.is_empty()))?;
         Ok(problem)
@@ -119,14 +124,13 @@ impl<'a> Problem<'a> {
         Ok(())
     }
 
-    /// Decides which images take part at this lag (`margin_s` around it), and weighs every dot as it lies now.
-    pub(super) fn weigh(&mut self, values: &Values, margin_s: f64) -> Result<(), FitError> {
-        self.choose_images(values.lag_s, margin_s)?;
+    /// Decides which images take part at this lag, and weighs every dot as it lies now.
+    pub(super) fn weigh(&mut self, values: &Values) -> Result<(), FitError> {
+        self.choose_images(values.lag_s)?;
         let (nominal, floor) = (self.nominal, Matrix2::identity() * self.floor_m * self.floor_m);
         let mut squared = Vec::new();
         for image in self.images.iter_mut().filter(|i| i.inside) {
-            let Some(pose) = motion::pose(self.track, image.stamp, values.lag_s) else { continue };
-            let chain = Chain::new(values, nominal, &self.stand, &pose);
+            let chain = Chain::new(values, nominal, &self.stand, &image.moment.after(0.0));
             for dot in &mut image.dots {
                 let wire = &self.wires[dot.wire];
                 let covariance = chain.covariance(&dot.covariance_px2, wire) + floor;
@@ -141,7 +145,7 @@ impl<'a> Problem<'a> {
 
     /// Weighs every dot by what is said of it; all images have to be inside.
     pub(super) fn weigh_as_said(&mut self, values: &Values) -> Result<(), FitError> {
-        self.weigh(values, 0.0)?;
+        self.weigh(values)?;
         self.sigma = 1.0;
         self.robust = Robust::None;
         let (inside, images) = (self.images.iter().filter(|i| i.inside).count(), self.images.len());
@@ -151,12 +155,12 @@ impl<'a> Problem<'a> {
         Ok(())
     }
 
-    fn choose_images(&mut self, lag_s: f64, margin_s: f64) -> Result<(), FitError> {
+    fn choose_images(&mut self, lag_s: f64) -> Result<(), FitError> {
+        self.lag_s = lag_s;
         for image in &mut self.images {
-            let covered = |by: f64| {
-                margin_s == 0.0 && by != 0.0 || motion::pose(self.track, image.stamp, lag_s + by).is_some()
-            };
-            image.inside = !image.dots.is_empty() && [0.0, -margin_s, margin_s].into_iter().all(covered);
+            let moment = Moment::at(self.track, image.stamp, lag_s);
+            image.inside = !image.dots.is_empty() && moment.is_some();
+            image.moment = moment.unwrap_or_else(Moment::rest);
         }
         let inside = self.images.iter().filter(|i| i.inside).count();
         if inside == 0 {
@@ -165,12 +169,15 @@ impl<'a> Problem<'a> {
         self.check_enough(self.images.iter().filter(|i| i.inside))
     }
 
-    /// The cost alone; `None` when an image left the track, or a number is none.
+    fn chain<'b>(&self, image: &ImageDots, values: &'b Values) -> Chain<'b> {
+        Chain::new(values, self.nominal, &self.stand, &image.moment.after(values.lag_s - self.lag_s))
+    }
+
+    /// The cost alone; `None` when it is no number.
     pub(super) fn cost(&self, values: &Values) -> Option<f64> {
         let mut cost = self.prior_cost(values);
         for image in self.images.iter().filter(|i| i.inside) {
-            let pose = motion::pose(self.track, image.stamp, values.lag_s)?;
-            let chain = Chain::new(values, self.nominal, &self.stand, &pose);
+            let chain = self.chain(image, values);
             for dot in &image.dots {
                 let error = dot.whiten * chain.off(dot.at_px, &self.wires[dot.wire]);
                 cost += self.robust.cost(error.norm_squared() / (self.sigma * self.sigma)).0;
@@ -191,13 +198,12 @@ impl<'a> Problem<'a> {
         Normal { cost: slope.dot(&off) / 2.0, slope, square: Square::from_diagonal(&self.prior) }
     }
 
-    /// What one image says; `None` when the track does not cover it.
-    pub(super) fn image_normal(&self, image: &ImageDots, values: &Values) -> Option<Normal> {
-        let moment = motion::moment(self.track, image.stamp, values.lag_s, self.half_step_s)?;
-        let chain = Chain::new(values, self.nominal, &self.stand, &moment.world_from_probe);
+    /// What one image says.
+    pub(super) fn image_normal(&self, image: &ImageDots, values: &Values) -> Normal {
+        let chain = self.chain(image, values);
         let mut normal = Normal::zero();
         for dot in &image.dots {
-            let row = chain.row(dot.at_px, &self.wires[dot.wire], &moment);
+            let row = chain.row(dot.at_px, &self.wires[dot.wire], &image.moment.twist);
             let white = dot.whiten / self.sigma;
             let error = white * row.off;
             let (cost, weight) = self.robust.cost(error.norm_squared());
@@ -208,7 +214,7 @@ impl<'a> Problem<'a> {
                 normal.square.ger(weight, &by, &by, 1.0);
             }
         }
-        Some(normal)
+        normal
     }
 
     /// Every dot of the images that take part: how far it is from its wire (m), and that in standard deviations
@@ -216,8 +222,7 @@ impl<'a> Problem<'a> {
     pub(super) fn errors(&self, values: &Values) -> Vec<(Vector2<f64>, f64)> {
         let mut errors = Vec::new();
         for image in self.images.iter().filter(|i| i.inside) {
-            let Some(pose) = motion::pose(self.track, image.stamp, values.lag_s) else { continue };
-            let chain = Chain::new(values, self.nominal, &self.stand, &pose);
+            let chain = self.chain(image, values);
             errors.extend(image.dots.iter().map(|dot| {
                 let off = chain.off(dot.at_px, &self.wires[dot.wire]);
                 (off, (dot.whiten * off).norm_squared() / (self.sigma * self.sigma))
@@ -253,7 +258,7 @@ fn image(sighting: &Sighting, phantom: &WirePhantom) -> Result<ImageDots, FitErr
         Ok(WeighedDot { wire, at_px: seen.at_px, covariance_px2, whiten: Matrix2::identity() })
     };
     let dots = sighting.dots.iter().map(weighed).collect::<Result<_, _>>()?;
-    Ok(ImageDots { stamp: sighting.stamp, dots, inside: true })
+    Ok(ImageDots { stamp: sighting.stamp, dots, inside: true, moment: Moment::rest() })
 }
 
 fn lines(phantom: &WirePhantom) -> Result<Vec<WireLine>, FitError> {

@@ -8,9 +8,6 @@ use super::problem::{Normal, Problem, Square};
 const ROUNDS: usize = 12;
 /// Steps within a round.
 const STEPS: usize = 30;
-/// An image near the track's end takes part only this far (s) from it in the first round, half as far in each one
-/// after: the lag is still moving.
-const MARGIN_S: f64 = 0.06;
 /// Done when a step changes the cost by less than this part.
 const COST_WITHIN: f64 = 1e-10;
 /// Done when a round moves each parameter by less than this part of its standard error.
@@ -20,8 +17,7 @@ const SETTLED: f64 = 1e-3;
 pub(super) fn settle(problem: &mut Problem<'_>, start: Values) -> Result<Values, FitError> {
     let mut values = start;
     for round in 0..ROUNDS {
-        let margin_s = if problem.active[LAG] { MARGIN_S / f64::powi(2.0, round as i32) } else { 0.0 };
-        problem.weigh(&values, margin_s)?;
+        problem.weigh(&values)?;
         let before = values;
         values = descend(problem, &values, STEPS)?;
         if round >= 2 && moved(problem, &before, &values) < SETTLED {
@@ -29,7 +25,7 @@ pub(super) fn settle(problem: &mut Problem<'_>, start: Values) -> Result<Values,
         }
     }
     // The last word on weights and images, at the place that was found.
-    problem.weigh(&values, 0.0)?;
+    problem.weigh(&values)?;
     descend(problem, &values, STEPS)
 }
 
@@ -73,7 +69,7 @@ fn downhill(
 pub(super) fn normal(problem: &Problem<'_>, values: &Values) -> Option<Normal> {
     let mut sum = problem.prior_normal(values);
     for image in problem.images.iter().filter(|i| i.inside) {
-        sum.add(&problem.image_normal(image, values)?);
+        sum.add(&problem.image_normal(image, values));
     }
     (sum.cost.is_finite() && sum.slope.iter().all(|x| x.is_finite())).then_some(sum)
 }

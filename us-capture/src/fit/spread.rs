@@ -2,8 +2,6 @@
 
 use nalgebra::Vector3;
 
-use super::motion;
-use super::parameters::Values;
 use super::problem::Problem;
 
 /// What the poses of the images span.
@@ -15,21 +13,19 @@ pub(super) struct Spread {
     pub(super) speed_m_s: f64,
 }
 
-pub(super) fn of(problem: &Problem<'_>, values: &Values) -> Spread {
+pub(super) fn of(problem: &Problem<'_>) -> Spread {
     let inside = problem.images.iter().filter(|i| i.inside);
-    let moments: Vec<_> = inside
-        .filter_map(|i| motion::moment(problem.track, i.stamp, values.lag_s, problem.half_step_s))
-        .collect();
+    let moments: Vec<_> = inside.map(|image| image.moment).collect();
     let Some(first) = moments.get(moments.len() / 2) else {
         return Spread { turned_rad: Vector3::zeros(), speed_m_s: 0.0 };
     };
-    let home = first.world_from_probe.rotation.inverse();
+    let home = first.world_from_probe.isometry().rotation.inverse();
     let (mut least, mut most) = (Vector3::zeros(), Vector3::zeros());
     let mut speed = 0.0;
     for moment in &moments {
-        let turn = (home * moment.world_from_probe.rotation).scaled_axis();
+        let turn = (home * moment.world_from_probe.isometry().rotation).scaled_axis();
         (least, most) = (least.inf(&turn), most.sup(&turn));
-        speed += moment.linear.norm_squared();
+        speed += moment.twist.linear.norm_squared();
     }
     Spread { turned_rad: most - least, speed_m_s: (speed / moments.len() as f64).sqrt() }
 }

@@ -142,7 +142,7 @@ pub(super) fn conclude(
     if values.column_scale <= 0.0 || values.row_scale <= 0.0 {
         return Err(FitError::Mirrored { column: values.column_scale, row: values.row_scale });
     }
-    let told = Told::of(problem, values)?;
+    let told = Told::of(problem, values);
     let covariance = told.covariance(&problem.active, problem)?;
     let errors = problem.errors(values);
     let squared: f64 = errors.iter().map(|(off, _)| off.norm_squared()).sum();
@@ -162,11 +162,11 @@ pub(super) fn conclude(
         outside: problem.images.iter().filter(|i| !i.inside && !i.dots.is_empty()).count(),
         line_rms_m: (squared / errors.len().max(1) as f64).sqrt(),
         variance_factor: problem.sigma * problem.sigma,
-        design_effect: told.design_effect(problem),
+        design_effect: told.effect(&problem.active, problem) / told.scatter,
         shear_rad: told.shear(problem),
         weak: Vec::new(),
     };
-    fit.weak = weak::directions(&fit, problem, &spread::of(problem, values));
+    fit.weak = weak::directions(&fit, problem, &spread::of(problem));
     Ok(fit)
 }
 
@@ -176,21 +176,25 @@ struct Told {
     images: Vec<Normal>,
     /// What of the weights errors really feel: the cost is less curved where dots lie far out.
     curvature: f64,
+    /// What the dots' own errors scatter, over what the weights say.
+    scatter: f64,
 }
 
 impl Told {
-    fn of(problem: &Problem<'_>, values: &Values) -> Result<Self, FitError> {
+    fn of(problem: &Problem<'_>, values: &Values) -> Self {
         let inside = problem.images.iter().filter(|i| i.inside);
-        let images: Option<Vec<Normal>> = inside.map(|i| problem.image_normal(i, values)).collect();
-        let images = images.ok_or(FitError::Diverged)?;
+        let images: Vec<Normal> = inside.map(|i| problem.image_normal(i, values)).collect();
         let mut all = Normal::zero();
         images.iter().for_each(|image| all.add(image));
-        let (mut curved, mut weights) = (0.0, 0.0);
+        let (mut curved, mut weights, mut scattered) = (0.0, 0.0, 0.0);
         for (_, squared) in problem.errors(values) {
+            let weight = problem.robust.cost(squared).1;
             curved += problem.robust.curvature(squared);
-            weights += problem.robust.cost(squared).1;
+            weights += weight;
+            // A dot has two errors.
+            scattered += weight * weight * squared / 2.0;
         }
-        Ok(Self { all, images, curvature: (curved / weights).clamp(0.2, 1.0) })
+        Self { all, images, curvature: (curved / weights).clamp(0.2, 1.0), scatter: scattered / weights }
     }
 
     /// The covariance: inverse curvature, around the scatter of what the images say.
@@ -205,8 +209,8 @@ impl Told {
         let scatter = self.scatter(active, problem);
         let parameters = active.iter().filter(|a| **a).count() as f64;
         let images = self.images.len() as f64;
-        let trust = images / (images + 2.0 * parameters);
-        let effect = effect(&scatter, &self.all.square, active);
+        let trust = images / (images + 3.0 * parameters);
+        let effect = self.effect(active, problem);
         let middle = scatter * trust + self.all.square * (effect * (1.0 - trust)) + prior;
         Ok(inverse * middle * inverse)
     }
@@ -225,8 +229,19 @@ impl Told {
         scatter
     }
 
-    fn design_effect(&self, problem: &Problem<'_>) -> f64 {
-        effect(&self.scatter(&problem.active, problem), &self.all.square, &problem.active)
+    /// How much more the images scatter than their weights say, as a mean over all directions.
+    fn effect(&self, active: &[bool; COUNT], problem: &Problem<'_>) -> f64 {
+        let Ok(inverse) = invert(&(self.all.square + Square::from_diagonal(&problem.prior)), active) else {
+            return 1.0;
+        };
+        let (mut scatter, mut expected) = (0.0, 0.0);
+        for image in &self.images {
+            let part = inverse * image.square;
+            scatter += image.slope.dot(&(inverse * image.slope));
+            // The fit leans to every image a little, and leaves less of its errors than there was.
+            expected += part.trace() - part.component_mul(&part.transpose()).sum();
+        }
+        if expected > 0.0 { scatter / expected } else { 1.0 }
     }
 
     /// One step of the shear, were it free, and its standard error.
@@ -244,16 +259,6 @@ impl Told {
         slope[SHEAR] = self.all.slope[SHEAR];
         (-(inverse * slope)[SHEAR], covariance[(SHEAR, SHEAR)].max(0.0).sqrt())
     }
-}
-
-/// How much larger the scatter is than the dots alone say, as a mean over all directions.
-fn effect(scatter: &Square, square: &Square, active: &[bool; COUNT]) -> f64 {
-    let unit = units(square, active);
-    let count = unit.iter().filter(|u| **u > 0.0).count().max(1) as f64;
-    let white = scaled(square, &unit) + Square::identity() * 1e-9;
-    let Some(root) = white.cholesky() else { return 1.0 };
-    // Parameters that are left out have no scatter, and add nothing to the trace.
-    (root.inverse() * scaled(scatter, &unit)).trace() / count
 }
 
 /// The inverse over what is fitted; zero elsewhere.
