@@ -1,17 +1,16 @@
 //! [`DotFinder`]: the search, with room for images of one size.
 
-use nalgebra::Matrix2;
-
+use super::clutter::{self, Found};
 use super::floor::Floor;
-use super::region::{Grower, Moments};
+use super::region::{Grower, Grown, Whole};
 use super::shrink::{factor, shrink};
 use super::summits::{Summit, Summits};
-use super::{BadDots, Dot, DotSettings, Mask, clutter};
+use super::{BadDots, Dot, DotSettings, Mask};
 
 /// No floor is lower than this over the common grey level (of 255).
 const LEAST: u8 = 6;
-/// A wire's echo is at least so many pixels of the searched image.
-const SMALLEST: usize = 5;
+/// A summit is at least so much higher than the floor (of 255).
+const FAINTEST: f64 = 8.0;
 /// The most summits that are measured.
 const MOST_SUMMITS: usize = 256;
 
@@ -56,7 +55,7 @@ impl DotFinder {
             inside,
             floor: Floor::new(wide, high, block),
             summits: Summits::new(wide, high, longest, settings.prominence),
-            grower: Grower::new(wide, high),
+            grower: Grower::new(wide, high, longest),
             chosen: Vec::new(),
             settings,
         })
@@ -76,12 +75,12 @@ impl DotFinder {
         self.floor.lay(&self.small, &self.inside, wide, LEAST);
         self.choose();
         let chosen = std::mem::take(&mut self.chosen);
-        let mut dots: Vec<Dot> = chosen.iter().filter_map(|summit| self.dot(pixels, summit)).collect();
+        let mut found: Vec<Found> = chosen.iter().filter_map(|summit| self.found(pixels, summit)).collect();
         self.chosen = chosen;
-        dots.sort_by(|a, b| b.mass.total_cmp(&a.mass));
-        clutter::drop_second_echoes(&mut dots);
-        dots.truncate(self.settings.most);
-        Ok(dots)
+        found.sort_by(|a, b| b.dot.mass.total_cmp(&a.dot.mass));
+        clutter::drop_text(&mut found);
+        clutter::drop_second_echoes(&mut found);
+        Ok(found.into_iter().map(|found| found.dot).take(self.settings.most).collect())
     }
 
     /// The summits that are high enough, the highest over their floor first.
@@ -91,33 +90,22 @@ impl DotFinder {
         self.chosen.sort_by_key(|summit| std::cmp::Reverse(summit.level - summit.floor));
         let bright = self.chosen.get(self.chosen.len().min(9).saturating_sub(1));
         let least = bright.map_or(0.0, |s| self.settings.faintest * f64::from(s.level - s.floor));
-        self.chosen.retain(|summit| f64::from(summit.level - summit.floor) >= least);
+        self.chosen.retain(|summit| f64::from(summit.level - summit.floor) >= least.max(FAINTEST));
         self.chosen.truncate(MOST_SUMMITS);
     }
 
-    fn dot(&mut self, pixels: &[u8], summit: &Summit) -> Option<Dot> {
+    fn found(&mut self, pixels: &[u8], summit: &Summit) -> Option<Found> {
         let height = f64::from(summit.level - summit.floor);
         let edge = f64::from(summit.floor) + self.settings.edge * height;
-        let level = edge.max(f64::from(summit.base) + 1.0).max(f64::from(summit.saddle) + 1.0).ceil();
-        let cut = self.grower.grow(&self.small, &self.inside, summit, level.min(255.0) as u8);
-        if self.grower.piece.len() < SMALLEST {
+        let level =
+            edge.ceil().max(f64::from(summit.base) + 1.0).max(f64::from(summit.saddle) + 1.0).min(255.0);
+        let grown = self.grower.grow(&self.small, &self.inside, summit, level as u8);
+        if grown == Grown::NoDot {
             return None;
         }
-        let moments = self.grower.moments(pixels, self.k, self.size, level - 1.0)?;
-        Some(self.measured(&moments, cut))
-    }
-
-    fn measured(&self, moments: &Moments, cut: bool) -> Dot {
-        // A pixel is a square: its own spread keeps that of a dot of one line from being flat.
-        let spread = moments.spread + Matrix2::identity() / 12.0;
-        Dot {
-            at_px: moments.centre.into(),
-            covariance_px2: spread * self.settings.wobble.powi(2),
-            spread_px2: spread,
-            peak: f64::from(moments.peak),
-            mass: moments.mass,
-            cut,
-        }
+        let whole = Whole { pixels, width: self.size[0], height: self.size[1] };
+        let moments = self.grower.moments(&whole, self.k, level - 1.0)?;
+        Some(Found::new(&moments, grown == Grown::Cut, self.settings.wobble))
     }
 }
 

@@ -4,13 +4,28 @@ use nalgebra::{Matrix2, Vector2};
 
 use super::summits::Summit;
 
+/// A wire's echo is at least so many pixels of the searched image.
+const SMALLEST: usize = 5;
+
 /// Which pixels of the searched image were visited, and which belong to the piece.
 pub(super) struct Grower {
     width: usize,
     seen: Vec<u32>,
     round: u32,
+    longest: [f64; 2],
     /// The piece's pixels.
-    pub piece: Vec<u32>,
+    piece: Vec<u32>,
+}
+
+/// How a piece ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Grown {
+    /// All around it is darker.
+    Whole,
+    /// It touches the edge of what is looked at.
+    Cut,
+    /// It is too small or too long to be a dot.
+    NoDot,
 }
 
 /// The moments of a piece.
@@ -22,17 +37,25 @@ pub(super) struct Moments {
     pub centre: Vector2<f64>,
     /// Their second moments about it (px²).
     pub spread: Matrix2<f64>,
+    /// How uncertain the centre is by the noise of its pixels (px²).
+    pub noise: Matrix2<f64>,
     /// The brightest pixel.
     pub peak: u8,
+    /// The largest step from a pixel to its neighbour.
+    pub steepest: u8,
+    /// The box around it: first and last column and row.
+    pub first: [usize; 2],
+    /// Its other corner.
+    pub last: [usize; 2],
 }
 
 impl Grower {
-    pub(super) fn new(width: usize, height: usize) -> Self {
-        Self { width, seen: vec![0; width * height], round: 0, piece: Vec::new() }
+    pub(super) fn new(width: usize, height: usize, longest: [f64; 2]) -> Self {
+        Self { width, seen: vec![0; width * height], round: 0, longest, piece: Vec::new() }
     }
 
-    /// Grows the piece of pixels of at least `level` (and inside) around a summit; whether it was cut by an edge.
-    pub(super) fn grow(&mut self, image: &[u8], inside: &[u8], summit: &Summit, level: u8) -> bool {
+    /// Grows the piece of pixels of at least `level` (and inside) around a summit.
+    pub(super) fn grow(&mut self, image: &[u8], inside: &[u8], summit: &Summit, level: u8) -> Grown {
         self.next_round();
         self.piece.clear();
         let start = summit.at[1] * self.width + summit.at[0];
@@ -41,6 +64,9 @@ impl Grower {
         let (mut next, mut cut) = (0, false);
         while let Some(pixel) = self.piece.get(next).map(|p| *p as usize) {
             next += 1;
+            if self.too_far(pixel, summit) {
+                return Grown::NoDot;
+            }
             for near in around(pixel, self.width, image.len()) {
                 match near {
                     Some(near) if inside[near] != 0 => self.visit(image, near, level),
@@ -48,7 +74,17 @@ impl Grower {
                 }
             }
         }
-        cut
+        match cut {
+            _ if self.piece.len() < SMALLEST => Grown::NoDot,
+            true => Grown::Cut,
+            false => Grown::Whole,
+        }
+    }
+
+    /// The floor may have risen under the piece, and hidden how long it is.
+    fn too_far(&self, pixel: usize, summit: &Summit) -> bool {
+        let at = [pixel % self.width, pixel / self.width];
+        (0..2).any(|axis| at[axis].abs_diff(summit.at[axis]) as f64 > self.longest[axis])
     }
 
     fn visit(&mut self, image: &[u8], pixel: usize, level: u8) {
@@ -66,39 +102,114 @@ impl Grower {
         self.round += 1;
     }
 
+    /// The moments of the piece's brightness over `base`, in the whole image; `k` of its pixels, each way, are one of
+    /// the searched image.
+    pub(super) fn moments(&self, whole: &Whole<'_>, k: usize, base: f64) -> Option<Moments> {
+        let start = *self.piece.first()? as usize;
+        let origin = [start % self.width * k, start / self.width * k];
+        let mut sums = Sums::new(origin, base);
+        self.each(whole, k, |at| sums.add(whole, at));
+        let mut moments = sums.moments()?;
+        self.each(whole, k, |at| moments.add_noise(whole, at));
+        moments.noise /= moments.mass * moments.mass;
+        Some(moments)
+    }
+
     /// Calls `each` with the column and row of every pixel of the whole image in the piece.
-    pub(super) fn each(&self, k: usize, size: [usize; 2], mut each: impl FnMut(usize, usize)) {
+    fn each(&self, whole: &Whole<'_>, k: usize, mut each: impl FnMut([usize; 2])) {
         for pixel in &self.piece {
             let (column, row) = (*pixel as usize % self.width * k, *pixel as usize / self.width * k);
-            for v in row..(row + k).min(size[1]) {
-                for u in column..(column + k).min(size[0]) {
-                    each(u, v);
-                }
+            for v in row..(row + k).min(whole.height) {
+                (column..(column + k).min(whole.width)).for_each(|u| each([u, v]));
             }
         }
     }
+}
 
-    /// The moments of the piece's brightness over `base`, in the whole image.
-    pub(super) fn moments(&self, pixels: &[u8], k: usize, size: [usize; 2], base: f64) -> Option<Moments> {
-        let (mut mass, mut first, mut second) = (0.0, Vector2::zeros(), Matrix2::zeros());
-        let mut peak = 0;
-        let origin =
-            self.piece.first().map(|p| (*p as usize % self.width * k, *p as usize / self.width * k))?;
-        self.each(k, size, |u, v| {
-            let pixel = pixels[v * size[0] + u];
-            let weight = (f64::from(pixel) - base).max(0.0);
-            let at = Vector2::new(u as f64 - origin.0 as f64, v as f64 - origin.1 as f64);
-            (mass, first, second) =
-                (mass + weight, first + at * weight, second + at * at.transpose() * weight);
-            peak = pixel.max(peak);
-        });
+/// The whole image.
+pub(super) struct Whole<'a> {
+    /// Its pixels, row after row.
+    pub pixels: &'a [u8],
+    /// Its columns.
+    pub width: usize,
+    /// Its rows.
+    pub height: usize,
+}
+
+impl Whole<'_> {
+    fn at(&self, [u, v]: [usize; 2]) -> u8 {
+        self.pixels[v * self.width + u]
+    }
+
+    /// The nine pixels around a place, those beyond the edge as the last before it.
+    fn around(&self, [u, v]: [usize; 2]) -> [[f64; 3]; 3] {
+        let columns = [u.saturating_sub(1), u, (u + 1).min(self.width - 1)];
+        let rows = [v.saturating_sub(1), v, (v + 1).min(self.height - 1)];
+        rows.map(|v| columns.map(|u| f64::from(self.at([u, v]))))
+    }
+
+    /// The larger of the steps to the next column and the next row.
+    fn step(&self, [u, v]: [usize; 2]) -> u8 {
+        let here = self.at([u, v]);
+        let right = self.at([(u + 1).min(self.width - 1), v]);
+        here.abs_diff(right).max(here.abs_diff(self.at([u, (v + 1).min(self.height - 1)])))
+    }
+}
+
+/// The running sums of a piece, about its first pixel: small numbers, nothing is lost.
+struct Sums {
+    origin: [usize; 2],
+    base: f64,
+    mass: f64,
+    first_moment: Vector2<f64>,
+    second_moment: Matrix2<f64>,
+    peak: u8,
+    steepest: u8,
+    first: [usize; 2],
+    last: [usize; 2],
+}
+
+impl Sums {
+    fn new(origin: [usize; 2], base: f64) -> Self {
+        let (first_moment, second_moment) = (Vector2::zeros(), Matrix2::zeros());
+        let (first, last) = (origin, origin);
+        Self { origin, base, mass: 0.0, first_moment, second_moment, peak: 0, steepest: 0, first, last }
+    }
+
+    fn add(&mut self, whole: &Whole<'_>, at: [usize; 2]) {
+        let pixel = whole.at(at);
+        let weight = (f64::from(pixel) - self.base).max(0.0);
+        let off = |axis: usize| at[axis] as f64 - self.origin[axis] as f64;
+        let off = Vector2::new(off(0), off(1));
+        self.mass += weight;
+        self.first_moment += off * weight;
+        self.second_moment += off * off.transpose() * weight;
+        self.peak = self.peak.max(pixel);
+        self.steepest = self.steepest.max(whole.step(at));
+        self.first = [self.first[0].min(at[0]), self.first[1].min(at[1])];
+        self.last = [self.last[0].max(at[0]), self.last[1].max(at[1])];
+    }
+
+    fn moments(&self) -> Option<Moments> {
+        let Self { mass, peak, steepest, first, last, .. } = *self;
         if mass <= 0.0 {
             return None;
         }
-        let centre = first / mass;
-        let spread = second / mass - centre * centre.transpose();
-        let centre = centre + Vector2::new(origin.0 as f64, origin.1 as f64);
-        Some(Moments { mass, centre, spread, peak })
+        let off = self.first_moment / mass;
+        let spread = self.second_moment / mass - off * off.transpose();
+        let centre = Vector2::new(self.origin[0] as f64, self.origin[1] as f64) + off;
+        Some(Moments { mass, centre, spread, noise: Matrix2::zeros(), peak, steepest, first, last })
+    }
+}
+
+impl Moments {
+    /// A pixel of standard deviation s, off the centre by x, moves it by x s / mass. The noise is what is left of the
+    /// nine pixels around after all that is smooth is taken out: Immerkær, CVIU 64 (1996) 300.
+    fn add_noise(&mut self, whole: &Whole<'_>, at: [usize; 2]) {
+        let [a, b, c] = whole.around(at).map(|row| row[0] - 2.0 * row[1] + row[2]);
+        let rough = (a - 2.0 * b + c) / 6.0;
+        let off = Vector2::new(at[0] as f64, at[1] as f64) - self.centre;
+        self.noise += off * off.transpose() * rough * rough;
     }
 }
 

@@ -7,6 +7,8 @@ use crate::PixelSpacing;
 const LONGEST_M: f64 = 6.0e-3;
 /// With an unknown spacing: the longest, as a part of the image's longer side.
 const LONGEST_PART: f64 = 0.1;
+/// With an unknown spacing: the longest is no shorter than this (px), as the image may be a piece of another.
+const LONGEST_LEAST: f64 = 64.0;
 
 /// What counts as a dot. Lengths come from the pixels' spacing where it is known, else from the size of the image.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,7 +31,7 @@ pub struct DotSettings {
 impl Default for DotSettings {
     /// For images whose spacing nobody knows.
     fn default() -> Self {
-        Self { longest_px: None, prominence: 0.5, faintest: 0.2, edge: 0.2, wobble: 0.1, most: 48 }
+        Self { longest_px: None, prominence: 0.5, faintest: 0.2, edge: 0.1, wobble: 0.1, most: 48 }
     }
 }
 
@@ -43,7 +45,7 @@ impl DotSettings {
 
     /// The longest a dot may be in an image of this size (px).
     pub(super) fn longest_in(&self, width: usize, height: usize) -> [f64; 2] {
-        let fallback = (LONGEST_PART * width.max(height) as f64).max(8.0);
+        let fallback = (LONGEST_PART * width.max(height) as f64).max(LONGEST_LEAST);
         self.longest_px.unwrap_or([fallback; 2]).map(|length| length.max(5.0))
     }
 
