@@ -6,7 +6,8 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use probepath_frames::nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use probepath_frames::{Direction, Image, Point, Pose, World};
 use probepath_sim::{
-    Contact, ImagingConfig, Leg, LegConfig, PhantomConfig, Renderer, Tissue, VascularPhantom, settings,
+    Contact, ImagingConfig, Leg, LegConfig, PhantomConfig, Renderer, Tissue, VascularPhantom,
+    WirePhantomConfig, WireTank, settings,
 };
 use probepath_us_capture::Setting;
 
@@ -42,6 +43,11 @@ fn bench(c: &mut Criterion) {
     measure("phantom_zoom_3_7", &phantom, zoom, over_phantom, up);
     measure("leg_depth_5_cm", &leg, settings::whole_depth(0.05, 0.030), over_leg, normal);
     measure("leg_depth_7_cm", &leg, settings::whole_depth(0.07, 0.045), over_leg, normal);
+    let Ok(tank) = WireTank::new(&WirePhantomConfig::default(), 1) else { return };
+    // Between the plates, and where the beam grazes one of them and meets the bottom.
+    let over = |z: f64| Point::new(0.0, tank.water_y() + 0.045, z);
+    measure("wires_depth_7_cm", &tank, settings::whole_depth(0.07, 0.045), over(0.0), up);
+    measure("wires_near_a_plate_depth_8_cm", &tank, settings::whole_depth(0.08, 0.045), over(0.027), up);
 }
 
 criterion_group!(benches, bench);
