@@ -17,7 +17,9 @@ const FACET_SIGMAS: f64 = 3.0;
 /// A wire is walked in steps no longer than this across the plane (m), and half a cell of the grid in it.
 const ACROSS_STEP_M: f64 = 0.1e-3;
 /// A face is made of squares of this edge (m).
-const SQUARE_M: f64 = 0.2e-3;
+const SQUARE_M: f64 = 0.3e-3;
+/// An echo weaker than this is not drawn: 60 dB below tissue.
+const FAINTEST: f64 = 0.5e-3;
 /// A wire's unevenness changes over this length (m).
 const UNEVEN_M: f64 = 1e-3;
 /// What sets the faces' roughness apart from the speckle of the same seed.
@@ -192,6 +194,9 @@ impl<'a> Reflecting<'a> {
             facet.amplitude * self.squarely(cosine.acos(), self.config.face_specular_deg),
             facet.amplitude * facet.rough * cosine,
         ];
+        if strength[0].max(strength[1]) < FAINTEST {
+            return;
+        }
         for i in 0..counts[0] as i64 {
             let start = from + one * (i as f64 + 0.5) + other * 0.5;
             let whole = (0.0, counts[1] - 1.0);
@@ -205,8 +210,12 @@ impl<'a> Reflecting<'a> {
 
     fn square(&self, echoes: &mut Echoes, p: &Vector3<f64>, strength: [f64; 2], random: [f64; 2]) {
         let depth = self.depth(p).max(0.0);
-        let (sigma, lateral) = (self.beam.elevational(depth), self.beam.lateral(depth));
+        let sigma = self.beam.elevational(depth);
         let fading = self.fading(p.z, sigma);
+        if fading * strength[0].max(strength[1]) < FAINTEST {
+            return;
+        }
+        let lateral = self.beam.lateral(depth);
         let area = SQUARE_M * SQUARE_M / (std::f64::consts::PI * sigma * lateral);
         let mirrored = strength[0] * fading * area / 2.0;
         let scattered = strength[1] * fading * area.sqrt();
