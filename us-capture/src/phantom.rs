@@ -33,7 +33,7 @@ use nalgebra::Vector3;
 use probepath_frames::{Phantom, Point};
 
 use crate::plus;
-pub(crate) use check::same_place;
+pub(crate) use check::{counts, same_place};
 pub use error::{BadPhantom, Fault, Part};
 
 /// A straight wire between two plates. Beyond its ends there is none.

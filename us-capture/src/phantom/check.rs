@@ -8,8 +8,8 @@ use probepath_frames::{Phantom, Point};
 use super::error::{BadPhantom, Fault, Part};
 use super::{Wire, WirePhantom, ZFiducial};
 
-/// More wires than this are no phantom's, and two of them in one place could not be looked for in good time.
-const MOST_WIRES: usize = 1000;
+/// More wires, Zs or landmarks than this are no phantom's, and two in one place could not be looked for in good time.
+const MOST: usize = 1000;
 /// A phantom stands in a water bath and is written about a point near it.
 const FARTHEST_MM: f64 = 2000.0;
 /// A shorter wire is a point, or metres that were taken for millimetres.
@@ -28,7 +28,10 @@ pub(super) fn check(phantom: &WirePhantom) -> Result<(), BadPhantom> {
     if phantom.name.trim().is_empty() {
         return Err(Fault::NoName.of(Part::Phantom));
     }
-    count(phantom.wires.len())?;
+    counts(phantom.wires.len(), phantom.zs.len(), phantom.landmarks.len())?;
+    if phantom.wires.len() < 3 {
+        return Err(Fault::TooFewWires { found: phantom.wires.len() }.of(Part::Phantom));
+    }
     names(phantom.wires.iter().map(|w| w.name.as_str()), Part::Wire)?;
     names(phantom.landmarks.iter().map(|l| l.name.as_str()), Part::Landmark)?;
     for (index, wire) in phantom.wires.iter().enumerate() {
@@ -44,12 +47,14 @@ pub(super) fn check(phantom: &WirePhantom) -> Result<(), BadPhantom> {
     Ok(())
 }
 
-fn count(found: usize) -> Result<(), BadPhantom> {
-    match found {
-        0..3 => Err(Fault::TooFewWires { found }.of(Part::Phantom)),
-        3..=MOST_WIRES => Ok(()),
-        _ => Err(Fault::TooManyWires { found, most: MOST_WIRES }.of(Part::Phantom)),
+/// Whether there are as many parts as phantoms have; looked at before they are compared with each other.
+pub(crate) fn counts(wires: usize, zs: usize, landmarks: usize) -> Result<(), BadPhantom> {
+    for (what, found) in [("wires", wires), ("Zs", zs), ("landmarks", landmarks)] {
+        if found > MOST {
+            return Err(Fault::TooMany { what, found, most: MOST }.of(Part::Phantom));
+        }
     }
+    Ok(())
 }
 
 fn names<'a>(

@@ -64,8 +64,10 @@ pub enum Fault {
         found: usize,
     },
     /// More than any phantom has.
-    #[error("it has {found} wires, more than {most}")]
-    TooManyWires {
+    #[error("it has {found} {what}, more than {most}")]
+    TooMany {
+        /// Of what.
+        what: &'static str,
         /// How many.
         found: usize,
         /// How many are read.

@@ -7,6 +7,7 @@ use probepath_frames::{Phantom, Point};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
+use super::check;
 use super::error::{BadPhantom, Fault, Part};
 use super::{Landmark, Wire, WirePhantom, ZFiducial};
 
@@ -75,6 +76,7 @@ fn text(path: &Path) -> std::io::Result<String> {
 
 pub(super) fn from_toml(text: &str) -> Result<WirePhantom, BadPhantom> {
     let layout: Layout = toml::from_str(text).map_err(|error| BadPhantom::Toml { why: error.to_string() })?;
+    check::counts(layout.wire.len(), layout.z.len(), layout.landmark.len())?;
     // Where every part begins, kept before the parts are taken.
     let starts = Starts::of(&layout);
     let at = |bad: BadPhantom| bad.at(|part| starts.line(text, part));

@@ -6,7 +6,7 @@ use roxmltree::Node;
 
 use super::xml::{bad, finite, line, missing};
 use super::{PlusError, PlusTransform};
-use crate::phantom::{Landmark, Part, Wire, WirePhantom, ZFiducial, same_place};
+use crate::phantom::{Landmark, Part, Wire, WirePhantom, ZFiducial, counts, same_place};
 
 /// What the elements said, with the line of each part.
 #[derive(Default)]
@@ -22,6 +22,9 @@ struct Parts {
 pub(super) fn parse(definition: Node<'_, '_>) -> Result<WirePhantom, PlusError> {
     let geometry = child(definition, "Geometry")
         .ok_or_else(|| PlusError::MissingElement { line: line(definition), element: "Geometry" })?;
+    let of = |name| geometry.descendants().filter(|n| n.has_tag_name(name)).count();
+    // Every pattern makes one Z at most, of wires that were counted.
+    counts(of("Wire"), 0, of("Landmark")).map_err(|bad| PlusError::Phantom(Box::new(bad)))?;
     let mut parts = Parts::default();
     for node in geometry.children().filter(Node::is_element) {
         match node.tag_name().name() {
