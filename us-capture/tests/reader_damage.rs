@@ -1,4 +1,5 @@
 //! Damaged phantoms, PLUS configurations and calibrations: an error or something that is whole, never a panic, and soon.
+#![expect(clippy::expect_used, reason = "a test may stop at the first surprise")]
 #![expect(clippy::disallowed_methods, reason = "that reading ends soon is what is tested")]
 
 use std::path::Path;
