@@ -19,6 +19,9 @@
 
 mod repeat;
 
+#[cfg(test)]
+mod tests;
+
 use probepath_frames::{Phantom, Point, Pose, Probe, Span, Track, World};
 
 use crate::PixelMap;

@@ -38,6 +38,9 @@ mod uncertainty;
 mod water;
 mod weak;
 
+#[cfg(test)]
+mod tests;
+
 use nalgebra::Matrix2;
 use probepath_frames::{Image, Phantom, Pose, Probe, Span, Stamp, Track, World};
 
@@ -144,5 +147,6 @@ pub fn fit(
         values = lag_scan::scan(&mut problem, &values, options.lag)?;
     }
     let values = solve::settle(&mut problem, values)?;
+    options.lag.check_found(values.lag_s)?;
     uncertainty::conclude(&problem, &values, options)
 }

@@ -2,6 +2,10 @@
 //!
 //! It never hears of robots.
 
+// Test support is written against the public names, and unit tests share it.
+#[cfg(test)]
+extern crate self as probepath_us_capture;
+
 mod bscan;
 mod calibration;
 mod capture;

@@ -103,6 +103,19 @@ pub enum FitError {
         /// What to do.
         advice: String,
     },
+    /// The lag ran out of what was allowed.
+    #[error(
+        "the lag comes out at {lag_s:.3} s, beyond {from_s:.3} to {to_s:.3} s: allow more, or see whether images and \
+         poses are of the same clock"
+    )]
+    LagBeyond {
+        /// Where it ran.
+        lag_s: f64,
+        /// The earliest allowed.
+        from_s: f64,
+        /// The latest allowed.
+        to_s: f64,
+    },
     /// The fit ran into numbers that are none.
     #[error("the fit does not converge from this start: the labels or the start are wrong")]
     Diverged,

@@ -1,4 +1,8 @@
 //! The probe at an instant: its pose, and how it moves.
+//!
+//! A pose that is repeated while stamps go on may be a stale encoder, or a probe at rest (the stepper of PLUS's data
+//! pauses between two moves for 0.3 s: poses and dots rest together). Nothing is left out for it: the poses of a stale
+//! encoder make outliers of their images, and the fit weighs them down.
 
 use nalgebra::Isometry3;
 use probepath_frames::{Pose, Probe, Span, Stamp, Track, Twist, World};

@@ -5,6 +5,9 @@ use probepath_frames::{Phantom, Pose, Span, World};
 use super::{FitError, speed_of_sound_in_water, water};
 use crate::PixelSpacing;
 
+/// A lag at an end of what is allowed may come out this far beyond it (s).
+const BEYOND_S: f64 = 0.05;
+
 /// What is known, and how.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FitOptions {
@@ -96,6 +99,18 @@ impl Lag {
             Self::Known(lag) => lag,
             Self::Estimated { from, to } => Span::ZERO.clamp(from, to.max(from)),
         }
+    }
+}
+
+impl Lag {
+    /// A best lag beyond the ends that were allowed is not the best one.
+    pub(super) fn check_found(self, lag_s: f64) -> Result<(), FitError> {
+        let Self::Estimated { from, to } = self else { return Ok(()) };
+        let (from_s, to_s) = (from.seconds(), to.seconds());
+        if (from_s - BEYOND_S..=to_s + BEYOND_S).contains(&lag_s) {
+            return Ok(());
+        }
+        Err(FitError::LagBeyond { lag_s, from_s, to_s })
     }
 }
 

@@ -8,6 +8,8 @@ use super::problem::{Normal, Problem, Square};
 const ROUNDS: usize = 12;
 /// Steps within a round.
 const STEPS: usize = 30;
+/// Less information than this says nothing: a standard error of a kilometre, a thousand turns, a quarter of an hour.
+const SILENT: f64 = 1e-6;
 /// Done when a step changes the cost by less than this part.
 const COST_WITHIN: f64 = 1e-10;
 /// Done when a round moves each parameter by less than this part of its standard error.
@@ -85,10 +87,10 @@ fn step(normal: &Normal, active: &[bool], damping: f64) -> Option<Step> {
     Some(-square.cholesky()?.solve(&slope).component_mul(&unit))
 }
 
-/// One over the root of each second derivative; zero for what is not fitted.
+/// One over the root of each second derivative; zero for what is not fitted, or what nothing speaks about.
 pub(super) fn units(square: &Square, active: &[bool]) -> Step {
     Step::from_fn(|k, _| {
-        let on = active.get(k).copied().unwrap_or(false) && square[(k, k)] > 0.0;
+        let on = active.get(k).copied().unwrap_or(false) && square[(k, k)] > SILENT;
         if on { square[(k, k)].sqrt().recip() } else { 0.0 }
     })
 }
