@@ -1,7 +1,10 @@
 //! What can be typed.
 
+mod calibrate;
+
 use std::path::PathBuf;
 
+pub use calibrate::{Calibrate, Spatial, Subject, Temporal};
 use clap::{Args, Parser, Subcommand};
 
 /// An ultrasound probe on a robot arm: taught by hand, replayed at constant force, reconstructed in 3D.
@@ -22,6 +25,9 @@ pub struct Cli {
 pub enum Command {
     /// Teach, replay, capture, reconstruct, report.
     Scan(Scan),
+    /// Where the image is on the probe, when it was formed, and how sure that is.
+    #[command(subcommand)]
+    Calibrate(Calibrate),
     /// The lumen of an exam once more, or the volume of a tracked sequence.
     Reconstruct(Reconstruct),
     /// How far a surface is from a gold standard.

@@ -1,5 +1,7 @@
 //! Each command: what was typed, brought to the room that does it.
 
+mod calibrate;
+
 use std::error::Error;
 
 use probepath_scripts::{Operator, ScanRequest, offline, validate};
@@ -16,6 +18,7 @@ type Outcome = Result<Document, Box<dyn Error>>;
 pub fn perform(command: Command, screen: &Screen) -> Outcome {
     let document = match command {
         Command::Scan(args) => return scan(args, screen),
+        Command::Calibrate(which) => return calibrate::perform(which, screen),
         Command::Reconstruct(args) => Document::of(&offline::reconstruct(
             &args.input,
             args.calibration.as_deref(),

@@ -3,6 +3,7 @@
 //! Each answer says itself twice: as text for people (`Display`) and as data for programs (`Serialize`).
 
 mod arm;
+pub mod calibrate;
 mod compare;
 mod convert;
 mod reconstruct;

@@ -1,5 +1,8 @@
 //! Pictures inside the report: PNG as a data URI, so that one file holds everything.
 
+mod letters;
+mod shapes;
+
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
@@ -20,6 +23,15 @@ impl Picture {
         Self { width, height, rgb: colour.repeat(width * height) }
     }
 
+    /// A picture of grey pixels, row after row; what is missing stays black.
+    pub fn grey(width: usize, height: usize, pixels: &[u8]) -> Self {
+        let mut picture = Self::filled(width, height, [0, 0, 0]);
+        for (rgb, grey) in picture.rgb.chunks_exact_mut(3).zip(pixels) {
+            rgb.fill(*grey);
+        }
+        picture
+    }
+
     /// Columns.
     pub const fn width(&self) -> usize {
         self.width
@@ -28,6 +40,12 @@ impl Picture {
     /// Rows.
     pub const fn height(&self) -> usize {
         self.height
+    }
+
+    /// Whether any pixel has this colour.
+    #[cfg(test)]
+    pub(crate) fn has(&self, colour: Colour) -> bool {
+        self.rgb.chunks_exact(3).any(|pixel| pixel == colour)
     }
 
     /// Colours a pixel; outside the picture it does nothing.

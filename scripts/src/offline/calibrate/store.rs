@@ -1,0 +1,75 @@
+//! The calibration as a file.
+
+use std::path::Path;
+
+use probepath_us_capture::errors::{Found as Errors, Summary};
+use probepath_us_capture::fit::{Fit, speed_of_sound_in_water};
+use probepath_us_capture::{Calibration, CalibrationError, FoundMm, Quality, Setting, Water};
+
+use super::CalibrateError;
+use super::options::ASSUMED_M_S;
+use super::request::SpatialRequest;
+use super::wishes::Scale;
+
+/// Writes the calibration; `errors` are those on images it had not seen, where there are any (`held_out`).
+///
+/// # Errors
+/// When the disk refuses, or a number is one that no calibration can have.
+pub(super) fn write(
+    path: &Path,
+    request: &SpatialRequest,
+    size: (usize, usize),
+    fit: &Fit,
+    phantom: &str,
+    (errors, held_out): (&Errors, bool),
+) -> Result<(), CalibrateError> {
+    let name =
+        request.sequence.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    let calibration = Calibration {
+        id: format!("{}-{}", request.date, name.trim_end_matches(".igs")),
+        date: request.date.clone(),
+        phantom: phantom.to_owned(),
+        probe_from_image: fit.probe_from_image,
+        setting: setting(fit, size),
+        image_lag: fit.lag,
+        error: error(errors, held_out),
+        quality: Some(Quality {
+            found: FoundMm::of(errors, held_out),
+            water: water(request),
+            ..Quality::of(fit, size)
+        }),
+    };
+    Ok(calibration.write(path)?)
+}
+
+/// The water, where the pixels' size was corrected by it.
+fn water(request: &SpatialRequest) -> Option<Water> {
+    (request.scale == Some(Scale::Water)).then(|| Water {
+        temperature_celsius: request.water_celsius,
+        speed_of_sound_m_s: speed_of_sound_in_water(request.water_celsius),
+        assumed_m_s: ASSUMED_M_S,
+    })
+}
+
+/// The middle wires' error, as the field states it; a phantom of single wires has only distances from wires.
+fn error(errors: &Errors, held_out: bool) -> CalibrationError {
+    let of = if errors.mids.is_empty() { &errors.lines } else { &errors.mids };
+    let summary = Summary::of(of.iter().map(|dot| dot.error_m));
+    let count = of.len().max(1) as f64;
+    let mean = of.iter().map(|dot| dot.error_m).sum::<f64>() / count;
+    let scatter = of.iter().map(|dot| (dot.error_m - mean).powi(2)).sum::<f64>();
+    CalibrationError { rms_mm: summary.rms_m * 1e3, sd_mm: (scatter / count).sqrt() * 1e3, held_out }
+}
+
+/// What the size of the picture says of the machine: a sequence says no depth and no focus.
+fn setting(fit: &Fit, (width, height): (usize, usize)) -> Setting {
+    let depth_m = fit.spacing.y_m * height as f64;
+    Setting {
+        depth_m,
+        focus_m: depth_m / 2.0,
+        window_top_m: 0.0,
+        window_height_m: depth_m,
+        window_width_m: fit.spacing.x_m * width as f64,
+        spacing: fit.spacing,
+    }
+}
