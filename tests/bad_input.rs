@@ -8,13 +8,20 @@
     reason = "a test stops at the first surprise"
 )]
 
+#[path = "common/drawn.rs"]
+mod drawn;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use drawn::Drawn;
 use probepath_robot::Operator;
+use probepath_scripts::offline::calibrate::{PhantomToReference, PixelMm, SpatialRequest, SubjectRequest};
 use probepath_scripts::{ScanRequest, offline};
 use probepath_us_capture::exam::{Ending, Exam};
+use probepath_us_capture::phantom::WirePhantom;
+use probepath_us_capture::sequence::{Sequence, SequenceImage};
 
 const TEACH: &str = "let path = teach(#{ study: \"BAD-1\", side: \"left\" });\n";
 
@@ -160,5 +167,117 @@ fn an_exam_cut_anywhere_is_reconstructed_as_far_as_it_goes_or_refused_in_words()
         }
     }
     assert!(made > 0 && refused > 0, "{made} made, {refused} refused");
+    fs::remove_dir_all(out).unwrap();
+}
+
+/// What `calibrate spatial` says of a drawn sequence, after `spoil` had its way with it.
+fn not_calibrated(name: &str, drawn: &Drawn, images: usize, spoil: impl Fn(&mut SequenceImage)) -> String {
+    let out = folder(name);
+    let mut sequence = Sequence::new(drawn.size.0, drawn.size.1);
+    for image in drawn.sequence(images, 0.0).images() {
+        let mut image = image.clone();
+        spoil(&mut image);
+        sequence.push(image).unwrap();
+    }
+    let path = out.join("images.igs.mha");
+    sequence.write(&path).unwrap();
+    let request = SpatialRequest {
+        sequence: path,
+        subject: SubjectRequest { phantom: "fcal-1.2".into(), ..SubjectRequest::default() },
+        pixel_mm: Some(PixelMm { x: 0.13, y: 0.12 }),
+        phantom_to_reference: Some(PhantomToReference(drawn.phantom_to_reference())),
+        nominal: Some(nominal(&out, drawn)),
+        ..SpatialRequest::default()
+    };
+    let said =
+        offline::calibrate::spatial(&request, &()).map(|found| found.to_string()).unwrap_err().to_string();
+    fs::remove_dir_all(out).unwrap();
+    said
+}
+
+/// What is known of the probe: a configuration of PLUS with an earlier calibration.
+fn nominal(out: &Path, drawn: &Drawn) -> PathBuf {
+    let file = out.join("nominal.xml");
+    let matrix: Vec<String> = drawn.image_to_probe().transpose().iter().map(f64::to_string).collect();
+    let transform = format!("<Transform From=\"Image\" To=\"Probe\" Matrix=\"{}\"/>", matrix.join(" "));
+    fs::write(&file, format!("<P><CoordinateDefinitions>{transform}</CoordinateDefinitions></P>")).unwrap();
+    file
+}
+
+fn fcal() -> Drawn {
+    Drawn::over(WirePhantom::shipped("fcal-1.2").unwrap())
+}
+
+#[test]
+fn two_images_are_too_few_for_a_calibration() {
+    let said = not_calibrated("few", &fcal(), 2, |_| {});
+    assert!(said.contains("images") && said.contains("needed"), "{said}");
+}
+
+#[test]
+fn images_that_are_all_refused_say_why() {
+    let said = not_calibrated("black", &fcal(), 12, |image| {
+        image.pixels = Some(vec![3; 480 * 400].into());
+    });
+    assert!(said.contains("dot was found") && said.contains("images.igs.mha"), "{said}");
+}
+
+#[test]
+fn a_probe_that_does_not_move_is_no_calibration() {
+    let still = Drawn { travel_m: 0.0, tilt_rad: 0.0, ..fcal() };
+    let said = not_calibrated("still", &still, 12, |_| {});
+    assert!(said.contains("move") || said.contains("turn") || said.contains("tilt"), "{said}");
+}
+
+#[test]
+fn images_whose_poses_are_missing_are_said() {
+    let said = not_calibrated("poses", &fcal(), 12, |image| image.transforms.clear());
+    assert!(said.contains("no transform at all") && said.contains("--poses"), "{said}");
+}
+
+#[test]
+fn a_mirrored_image_is_refused() {
+    // Images alone cannot tell it from one that is seen from behind: what is known of the probe can.
+    let said = not_calibrated("mirrored", &fcal(), 20, |image| {
+        let mut pixels = image.pixels.clone().unwrap().to_vec();
+        pixels.chunks_exact_mut(480).for_each(<[u8]>::reverse);
+        image.pixels = Some(pixels.into());
+    });
+    assert!(said.contains("mirrored"), "{said}");
+}
+
+#[test]
+fn another_phantom_is_not_taken_for_the_one_that_was_named() {
+    let other = Drawn::over(WirePhantom::shipped("fcal-2.0").unwrap());
+    let said = not_calibrated("other", &other, 20, |_| {});
+    assert!(said.contains("phantom"), "{said}");
+}
+
+#[test]
+fn a_phantom_that_cannot_be_one_is_refused_at_its_line() {
+    let out = folder("phantom");
+    let others = "  { name = \"b\", front_mm = [5.0, 0.0, 0.0], back_mm = [25.0, 40.0, 0.0] },\n  { name = \"c\", front_mm = \
+                  [30.0, 0.0, 0.0], back_mm = [30.0, 40.0, 0.0] },\n";
+    let wire = |line: &str| format!("name = \"x\"\nwire = [\n  {line}\n{others}]\n");
+    let cases = [
+        (wire("{ name = \"a\", front_mm = [0.0, 0.0, 0.0], back_mm = [0.0, 0.0, 0.0] },"), "long"),
+        (
+            wire("{ name = \"a\", front_mm = [0.0, 0.0, 0.0], back_mm = [0.0, 40.0, 0.0], gauge = 1 },"),
+            "gauge",
+        ),
+        (wire("{ name = \"a\", front = [0.0, 0.0, 0.0], back_mm = [0.0, 40.0, 0.0] },"), "front"),
+    ];
+    for (text, word) in cases {
+        let file = out.join("phantom.toml");
+        fs::write(&file, &text).unwrap();
+        let subject = SubjectRequest { phantom: file.display().to_string(), ..SubjectRequest::default() };
+        let request = SpatialRequest { subject, ..SpatialRequest::default() };
+        let said = offline::calibrate::spatial(&request, &()).unwrap_err().to_string();
+        assert!(said.contains("phantom.toml") && said.contains(word) && said.contains("line"), "{said}");
+    }
+    let subject = SubjectRequest { phantom: "fcal-9".into(), ..SubjectRequest::default() };
+    let request = SpatialRequest { subject, ..SpatialRequest::default() };
+    let said = offline::calibrate::spatial(&request, &()).unwrap_err().to_string();
+    assert!(said.contains("fcal-9") && said.contains("fcal-1.2"), "{said}");
     fs::remove_dir_all(out).unwrap();
 }
