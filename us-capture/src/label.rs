@@ -18,6 +18,7 @@
 //! An image alone cannot tell a phantom from its symmetric twins, and, its plane having two sides, never a mirrored
 //! image from one seen from behind: the poses of a sequence decide the first, what is known of the probe the second.
 
+mod agree;
 mod anchors;
 mod assign;
 mod near;
@@ -26,6 +27,7 @@ mod refusal;
 mod search;
 mod section;
 mod seen;
+mod spacing;
 #[cfg(test)]
 mod tests;
 
@@ -35,12 +37,14 @@ use probepath_frames::{Image, Phantom, Pose};
 use crate::PixelSpacing;
 use crate::dots::Dot;
 use crate::phantom::WirePhantom;
+pub use agree::{AgreeOptions, Agreement, Candidates, Expect, Flipped, agree};
 use assign::{Window, Worth};
 use nalgebra::Vector2;
 use plane::{Belief, Match, Plane};
 pub use refusal::Refusal;
 use section::Section;
 use seen::Seen;
+pub use spacing::find_spacing;
 
 /// The wires that made the dots of one image.
 #[derive(Clone, Debug, PartialEq)]
@@ -155,7 +159,7 @@ impl Labeller {
         let best = found.swap_remove(0);
         if let Some(other) = found
             .iter()
-            .filter(|o| o.score > best.score - 6.0 && o.dots != best.dots)
+            .filter(|o| o.score > best.score - 8.0 && o.dots != best.dots)
             .min_by_key(|o| usize::MAX - o.count())
         {
             let (first, second) = (best.count(), other.count());
@@ -192,7 +196,7 @@ impl Labeller {
     /// The score below which clutter could have made it: three dots fix a plane and prove nothing.
     fn needed(&self, window: &Window) -> f64 {
         let dot = (window.area() / (std::f64::consts::TAU * self.belief.place_sd_m.powi(2))).ln();
-        if self.section.strands.len() == 3 { 2.0 * dot } else { 3.0 * dot + 3.0 }
+        if self.section.strands.len() == 3 { 2.0 * dot } else { 3.0 * dot + 2.0 }
     }
 
     fn window(&self, seen: &[Seen], spacing: PixelSpacing) -> Window {
@@ -216,7 +220,7 @@ impl Labeller {
     fn labels(&self, choice: &Choice, dots: &[Dot], seen: &[Seen]) -> Labels {
         let mut of_wire = vec![None; self.section.strands.len()];
         let mut squares = Vec::with_capacity(choice.matches.len());
-        for &(dot, wire) in &choice.matches {
+        for (dot, wire) in assign::alone(&choice.plane, &self.section, &choice.matches) {
             of_wire[wire] = Some(dots[dot]);
             if !seen[dot].cut {
                 squares.push(choice.plane.distance(&seen[dot], &self.section.strands[wire]).powi(2));

@@ -1,6 +1,6 @@
 //! Which dot belongs to which wire once the plane is nearly known, and how well that explains the image.
 
-use super::plane::{Belief, Match, Plane};
+use super::plane::{Belief, Crossing, Match, Plane};
 use super::section::Section;
 use super::seen::Seen;
 use nalgebra::Vector2;
@@ -9,6 +9,8 @@ use nalgebra::Vector2;
 const FOUND: f64 = 0.9;
 /// Wires nearer to their ends than this (m) need not be seen: plates, glue and holes hide them.
 const ENDS_M: f64 = 1.5e-3;
+/// Two wires nearer to each other in the image than this (m) make dots that cannot be told apart, or one dot.
+const CROWDED_M: f64 = 1.5e-3;
 
 /// Where dots can be: a rectangle of the image (m).
 #[derive(Clone, Copy, Debug)]
@@ -80,7 +82,8 @@ pub(super) fn worth(
     belief: &Belief,
     window: &Window,
 ) -> Worth {
-    let clutter = window.area().ln();
+    // False dots are as dense as the dots that this plane leaves unexplained.
+    let clutter = (window.area() / (seen.len() - matches.len() + 1) as f64).ln();
     let gain = |&(dot, wire): &Match| {
         let (misfit, determinant) = plane.misfit(&seen[dot], &section.strands[wire], belief);
         let width = std::f64::consts::TAU * determinant.max(1e-18).sqrt();
@@ -91,6 +94,17 @@ pub(super) fn worth(
     let scale = plane.stretch.norm_squared() / belief.scale_sd.powi(2);
     let found: f64 = matches.iter().map(gain).sum();
     Worth { score: found + missing as f64 * (1.0 - FOUND).ln() - (tilt + scale) / 2.0, missing }
+}
+
+/// The matches whose wire has no other so near in the image that one dot could be both.
+pub(super) fn alone(plane: &Plane, section: &Section, matches: &[Match]) -> Vec<Match> {
+    let seen = |c: &Crossing| c.inside > -1e-3;
+    let at: Vec<_> = section.strands.iter().map(|s| plane.crossing(s).filter(seen).map(|c| c.at)).collect();
+    let crowded = |wire: usize| {
+        let near = |other: usize| at[wire].zip(at[other]).is_some_and(|(a, b)| (a - b).norm() < CROWDED_M);
+        (0..at.len()).any(|other| other != wire && near(other))
+    };
+    matches.iter().filter(|m| !crowded(m.1)).copied().collect()
 }
 
 fn missing(plane: &Plane, section: &Section, matches: &[Match], window: &Window) -> usize {

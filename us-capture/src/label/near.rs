@@ -32,7 +32,8 @@ impl Labeller {
         let window = self.window(&seen, spacing);
         let choice = self.nearest(self.plane(predicted), &seen, &window, gate_m);
         let explained = choice.matches.len();
-        if !self.is_enough(&choice) || choice.worth.score < self.needed(&window) {
+        // The prediction says half of what dots alone would have to.
+        if !self.is_enough(&choice) || choice.worth.score < 0.5 * self.needed(&window) {
             let (needed, gate_mm) = (self.least(), gate_m * 1e3);
             return Err(Refusal::NotNear { dots: dots.len(), explained, needed, gate_mm });
         }

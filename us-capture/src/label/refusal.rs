@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use super::Flipped;
+
 /// Why no wires could be given to the dots: what was found, and what to do about it.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
@@ -85,6 +87,77 @@ pub enum Refusal {
         /// Dots that are cut.
         cut: usize,
     },
+    /// A sequence with too few images that can be labelled.
+    #[error(
+        "{labelled} of {images} images have enough dots and a pose, {needed} are needed: see why each image was \
+         refused"
+    )]
+    TooFewImages {
+        /// Images of the sequence.
+        images: usize,
+        /// Those with candidates and a pose.
+        labelled: usize,
+        /// Those needed.
+        needed: usize,
+    },
+    /// No choice of wires goes with the probe's poses.
+    #[error(
+        "the wires seen do not move as the probe does: at best {support} of {images} images agree (within \
+         {spread_mm:.1} mm), {needed} are needed; is it this phantom, do the poses belong to these images, and does \
+         the chain end at the probe?"
+    )]
+    Disagree {
+        /// Images with candidates and a pose.
+        images: usize,
+        /// Images that agree with the best choice.
+        support: usize,
+        /// Images needed.
+        needed: usize,
+        /// How far they are from each other (mm).
+        spread_mm: f64,
+    },
+    /// The phantom stands somewhere else.
+    #[error(
+        "{support} of {images} images agree with each other, but the phantom is not where it is said to be: it is \
+         {off_mm:.0} mm and {off_deg:.0} degrees from there, as far as these poses tell; check PhantomToReference \
+         (its direction, its date), or leave the place open"
+    )]
+    WrongPlace {
+        /// Images with candidates and a pose.
+        images: usize,
+        /// Images that agree with each other.
+        support: usize,
+        /// How far off it is (mm).
+        off_mm: f64,
+        /// How far it is turned (degrees).
+        off_deg: f64,
+    },
+    /// The image is mirrored, or lies on the probe the wrong way.
+    #[error(
+        "{support} of {images} images agree, but as images that are {flipped}: give the sequence's true orientation"
+    )]
+    Mirrored {
+        /// How.
+        flipped: Flipped,
+        /// Images with candidates and a pose.
+        images: usize,
+        /// Images that agree.
+        support: usize,
+    },
+    /// The phantom's file is mirrored.
+    #[error(
+        "{support} of {images} images agree (within {spread_mm:.1} mm) only when one axis of the phantom is \
+         reversed: a sign or the order of two coordinates in the phantom's file is wrong, or the tracker's axes are \
+         left-handed"
+    )]
+    MirroredPhantom {
+        /// Images with candidates and a pose.
+        images: usize,
+        /// Images that agree.
+        support: usize,
+        /// How far they are from each other (mm).
+        spread_mm: f64,
+    },
 }
 
 impl Refusal {
@@ -98,6 +171,11 @@ impl Refusal {
             Self::NotNear { .. } => "not_near",
             Self::Ambiguous { .. } => "ambiguous",
             Self::AtEdge { .. } => "at_edge",
+            Self::TooFewImages { .. } => "too_few_images",
+            Self::Disagree { .. } => "poses_disagree",
+            Self::WrongPlace { .. } => "wrong_place",
+            Self::Mirrored { .. } => "mirrored",
+            Self::MirroredPhantom { .. } => "mirrored_phantom",
         }
     }
 }
