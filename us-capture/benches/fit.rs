@@ -1,4 +1,9 @@
 //! What a calibration's fit costs: 200 images of nine dots, the lag among the unknowns.
+//!
+//! There is no peer in Rust: the crate `levenberg-marquardt` (0.15) is built on nalgebra 0.34. By hand, scipy's
+//! `least_squares` on PLUS's freehand dots (same residuals, weights and prior, vectorised, one thread): 11 lags in
+//! 3.7 s and a last fit in 0.45 s, where ours takes 0.1 s for 41 lags and all; it finds 0.434 s, 78.64 x 74.02
+//! micrometres, and 0.452 / 0.249 mm on the held-out half (ours: 0.438 s, 78.64 x 74.04, 0.450 / 0.246).
 #![allow(missing_docs, reason = "criterion_group! writes functions without documentation")]
 #![expect(clippy::unwrap_used, reason = "a benchmark may stop at the first surprise")]
 

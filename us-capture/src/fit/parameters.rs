@@ -60,6 +60,11 @@ impl Parameter {
     /// The lag.
     pub const LAG: Self = Self::ALL[LAG];
 
+    /// The one of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|parameter| parameter.name == name)
+    }
+
     pub(super) fn index(self) -> Option<usize> {
         Self::ALL.iter().position(|p| *p == self)
     }

@@ -238,3 +238,19 @@ fn planes_that_labels_gave_alone_are_a_start() {
     assert!(metres < 2e-3 && angle < 0.02, "{metres} m, {angle} rad");
     assert!(start_from_planes(&planes[..2], &truth.track, &options(&truth)).is_err());
 }
+
+#[test]
+fn an_uncertainty_that_a_file_kept_is_the_same() {
+    let truth = truth(13);
+    let found = fit(&truth.phantom, &truth.sightings, &truth.track, &options(&truth), None).unwrap();
+    let told = &found.uncertainty;
+    let names: Vec<Parameter> = told.parameters.iter().filter_map(|p| Parameter::named(p.name)).collect();
+    let spacings = (found.spacing, told.nominal());
+    let again = |names: Vec<Parameter>, covariance| {
+        Uncertainty::restored(&found.probe_from_image, spacings, names, covariance)
+    };
+    let restored = again(names.clone(), told.covariance.clone()).unwrap();
+    assert!((restored.standard_error(300.0, 200.0) - told.standard_error(300.0, 200.0)).abs() < 1e-15);
+    assert!(again(names[1..].to_vec(), told.covariance.clone()).is_none());
+    assert!(again(names, told.covariance.clone() * f64::NAN).is_none());
+}

@@ -1,7 +1,7 @@
 //! How sure the answer is: the covariance of the parameters, and of the points they reconstruct.
 
 use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix3xX, SMatrix};
-use probepath_frames::{Pose, Span};
+use probepath_frames::{Image, Phantom, Pose, Probe, Span, World};
 
 use super::parameters::{COLUMN_SCALE, COUNT, Parameter, ROW_SCALE, SHEAR, SHIFT, Step, TURN, Values};
 use super::problem::{Normal, Problem, Square};
@@ -54,6 +54,29 @@ impl Geometry {
 impl Uncertainty {
     pub(super) fn of(covariance: &Square, active: &[bool; COUNT], geometry: Geometry) -> Self {
         Self { parameters: fitted(active), covariance: kept(covariance, active), geometry }
+    }
+
+    /// From what a file kept: the calibration, the spacing that the factors multiply, names and covariance. `None` when
+    /// they do not belong together: sizes that differ, a name twice, a number that is none, a negative variance.
+    pub fn restored(
+        probe_from_image: &Pose<Probe, Image>,
+        (spacing, nominal): (PixelSpacing, PixelSpacing),
+        parameters: Vec<Parameter>,
+        covariance: DMatrix<f64>,
+    ) -> Option<Self> {
+        let count = parameters.len();
+        let twice = (1..count).any(|k| parameters[..k].contains(&parameters[k]));
+        let sized = covariance.shape() == (count, count) && !twice;
+        let finite =
+            covariance.iter().all(|x| x.is_finite()) && covariance.diagonal().iter().all(|x| *x >= 0.0);
+        let probe_from_image = *probe_from_image.isometry();
+        let geometry = Geometry { probe_from_image, spacing, nominal };
+        (sized && finite).then_some(Self { parameters, covariance, geometry })
+    }
+
+    /// The spacing that the factors of columns and rows multiply.
+    pub const fn nominal(&self) -> PixelSpacing {
+        self.geometry.nominal
     }
 
     /// The standard error of a parameter, in its unit; `None` when it was not fitted.
@@ -146,16 +169,12 @@ pub(super) fn conclude(
     let covariance = told.covariance(&problem.active, problem)?;
     let errors = problem.errors(values);
     let squared: f64 = errors.iter().map(|(off, _)| off.norm_squared()).sum();
-    let to_middle = problem.stand.middle;
-    let about = Isometry3::translation(to_middle.x, to_middle.y, to_middle.z);
-    let nominal = options.place.pose();
     let mut fit = Fit {
         // FRAMES: the solver's values, turned and shifted from a pose of the Image in the Probe.
         probe_from_image: Pose::assume(values.probe_from_image),
         spacing: values.spacing(options.spacing),
         lag: Span::from_seconds(values.lag_s),
-        // FRAMES: the nominal place, then the correction, which stays in the Phantom's own axes.
-        world_from_phantom: nominal * Pose::assume(about * values.place() * about.inverse()),
+        world_from_phantom: refined(problem, values, options.place.pose()),
         uncertainty: Uncertainty::of(&covariance, &problem.active, Geometry::of(values, options.spacing)),
         images: problem.images.iter().filter(|i| i.inside).count(),
         dots: errors.len(),
@@ -168,6 +187,14 @@ pub(super) fn conclude(
     };
     fit.weak = weak::directions(&fit, problem, &spread::of(problem));
     Ok(fit)
+}
+
+/// The nominal place with its correction, which turns about the middle of the wires.
+fn refined(problem: &Problem<'_>, values: &Values, nominal: Pose<World, Phantom>) -> Pose<World, Phantom> {
+    let middle = problem.stand.middle;
+    let about = Isometry3::translation(middle.x, middle.y, middle.z);
+    // FRAMES: the correction stays in the Phantom's own axes.
+    nominal * Pose::assume(about * values.place() * about.inverse())
 }
 
 /// What every image says at the end.
