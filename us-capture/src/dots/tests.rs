@@ -1,5 +1,7 @@
 //! Dots that are known: drawn, moved, cut.
 
+mod honest;
+
 use super::*;
 
 /// An image of Gaussian dots (column, row, peak, spreads along columns and rows).
