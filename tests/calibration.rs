@@ -70,7 +70,8 @@ fn of_plus(results: &str, section: &str) -> Vec<(usize, Vec<[f64; 2]>)> {
     let section = document.descendants().find(|node| node.has_tag_name(section)).unwrap();
     let frames = section.children().filter(|node| node.has_tag_name("Frame"));
     let frame = |node: roxmltree::Node<'_, '_>| {
-        let points = node.descendants().filter(|point| point.has_tag_name("Point"));
+        let segmented = node.children().filter(|child| child.has_tag_name("SegmentedPoints"));
+        let points = segmented.flat_map(|list| list.children()).filter(|point| point.has_tag_name("Point"));
         let dots = points.map(|point| {
             let mut at = point.attribute("Position").unwrap().split_whitespace().map(|x| x.parse().unwrap());
             [at.next().unwrap(), at.next().unwrap()]
