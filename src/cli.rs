@@ -137,6 +137,8 @@ pub struct Validate {
 /// What can be validated.
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 pub enum Goal {
+    /// Table I of the paper: the calibration's precision, setting by setting, and its true error.
+    Table1,
     /// Table II of the paper: the error of the reconstructed phantom, setting by setting.
     Table2,
     /// The contact force along the leg.

@@ -53,6 +53,7 @@ fn scan(args: crate::cli::Scan, screen: &Screen) -> Outcome {
 fn validated(args: &crate::cli::Validate, screen: &Screen) -> Outcome {
     let (progress, seeds) = (screen.progress(), args.seeds);
     Ok(match args.goal {
+        Goal::Table1 => Document::of(&validate::table1(seeds, args.setting.as_deref(), &*progress)?),
         Goal::Table2 => Document::of(&validate::table2(seeds, args.setting.as_deref(), &*progress)?),
         Goal::Force => Document::of(&validate::force(seeds, &*progress)?),
         Goal::Motion => Document::of(&validate::motion(seeds, &*progress)?),

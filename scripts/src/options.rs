@@ -31,6 +31,18 @@ impl Options {
         })
     }
 
+    /// A number of things, when the key is there.
+    ///
+    /// # Errors
+    /// When the value is no whole number, or below zero.
+    pub fn count(&mut self, key: &'static str) -> Result<Option<usize>, String> {
+        let Some(value) = self.take(key) else { return Ok(None) };
+        let count = value.as_int().ok().and_then(|count| usize::try_from(count).ok());
+        count.map(Some).ok_or_else(|| {
+            format!("{}: `{key}` is a number of things, written as 24; found {}", self.step, describe(&value))
+        })
+    }
+
     /// A text, when the key is there.
     ///
     /// # Errors

@@ -11,6 +11,7 @@
 //! below it. A stop works at any instant: inside a step the loop brakes the arm, between two steps the script ends. A
 //! script that never ends is ended by its budget. Errors give line and column.
 
+mod calibration;
 mod steps;
 
 use std::sync::{Arc, Mutex};
@@ -28,6 +29,12 @@ const MOST_OPERATIONS: u64 = 20_000_000;
 /// The protocol that is run when none is named: the femoral artery.
 pub const FEMORAL: &str = include_str!("../library/femoral.rhai");
 
+/// The calibration of the probe on a phantom of wires.
+pub const CALIBRATE: &str = include_str!("../library/calibrate.rhai");
+
+/// The protocols that come along, by name.
+const LIBRARY: [(&str, &str); 2] = [("femoral", FEMORAL), ("calibrate", CALIBRATE)];
+
 /// A protocol's text and the name it goes by.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Protocol {
@@ -41,6 +48,18 @@ impl Protocol {
     /// The default protocol.
     pub fn femoral() -> Self {
         Self { name: "femoral.rhai".into(), text: FEMORAL.into() }
+    }
+
+    /// The protocol of this name (`calibrate` or `calibrate.rhai`) that comes along, when there is one.
+    pub fn of_library(name: &str) -> Option<Self> {
+        let bare = name.strip_suffix(".rhai").unwrap_or(name);
+        let (name, text) = LIBRARY.into_iter().find(|(known, _)| *known == bare)?;
+        Some(Self { name: format!("{name}.rhai"), text: text.into() })
+    }
+
+    /// Whether it is the library's calibration, whose simulated cell is the one with the phantom of wires.
+    pub fn is_calibration(&self) -> bool {
+        self.text == CALIBRATE
     }
 }
 
@@ -170,6 +189,7 @@ fn engine(stage: &Stage, operator: &Operator) -> Engine {
     engine.on_debug(move |text, _, position| lock(&session).say(&format!("{position:?}: {text}")));
     crate::quantity::register(&mut engine);
     steps::register(&mut engine, stage);
+    calibration::register(&mut engine, stage);
     engine
 }
 
@@ -225,7 +245,7 @@ fn innermost(mut error: &EvalAltResult) -> &EvalAltResult {
 
 fn not_found(signature: &str) -> String {
     let name = signature.split([' ', '(']).next().unwrap_or(signature);
-    let usage = steps::USAGE.iter().find(|(step, _)| *step == name);
+    let usage = steps::usage().find(|(step, _)| *step == name);
     usage.map_or_else(
         || format!("nothing is called `{signature}`; the steps are {}", steps::names()),
         |(_, how)| format!("`{signature}` does not fit; write {how}"),

@@ -64,6 +64,11 @@ quantity! {
     Duration, "a length of time", "seconds(2)", "s", 1.0
 }
 
+quantity! {
+    /// A temperature (degrees Celsius inside).
+    Temperature, "a temperature", "celsius(20)", "degrees Celsius", 1.0
+}
+
 /// Nine digits are more than any protocol measures, and hide the last bits of a conversion.
 fn round(value: f64) -> f64 {
     (value * 1e9).round() / 1e9
@@ -76,6 +81,7 @@ pub fn register(engine: &mut Engine) {
     family::<Speed>(engine, "Speed", &[("mm_s", 1e-3), ("cm_s", 1e-2)], Speed, Speed::si);
     let degree = 1f64.to_radians();
     family::<Angle>(engine, "Angle", &[("degrees", degree), ("radians", 1.0)], Angle, Angle::si);
+    family::<Temperature>(engine, "Temperature", &[("celsius", 1.0)], Temperature, Temperature::si);
     family::<Duration>(engine, "Duration", &[("seconds", 1.0), ("minutes", 60.0)], Duration, Duration::si);
 }
 
@@ -140,6 +146,7 @@ pub fn describe(value: &Dynamic) -> String {
         .or_else(|| shown::<Speed>(value))
         .or_else(|| shown::<Angle>(value))
         .or_else(|| shown::<Duration>(value))
+        .or_else(|| shown::<Temperature>(value))
         .unwrap_or_else(|| format!("`{value}`"))
 }
 

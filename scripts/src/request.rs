@@ -14,7 +14,7 @@ use crate::session::{CellFile, Opening, Session, SessionError};
 /// What was asked for.
 #[derive(Clone, Debug)]
 pub struct ScanRequest {
-    /// The protocol's file; the femoral artery when none.
+    /// The protocol's file, or the name of one that comes along (`calibrate`); the femoral artery when none.
     pub protocol: Option<PathBuf>,
     /// The cell's file; the simulated cell when none.
     pub cell: Option<PathBuf>,
@@ -58,7 +58,11 @@ impl ScanRequest {
     /// When a file cannot be read, the cell cannot be connected, or the protocol does not run to its end.
     pub fn run(&self, operator: &Operator, progress: Arc<dyn Progress>) -> Result<Report, ScanError> {
         let protocol = self.protocol()?;
-        let cell = self.cell.as_deref().map(CellFile::read).transpose()?.unwrap_or_default();
+        let cell = match self.cell.as_deref() {
+            Some(file) => CellFile::read(file)?,
+            None if protocol.is_calibration() => CellFile::wire_phantom(),
+            None => CellFile::default(),
+        };
         let session = Session::open(Opening {
             cell,
             seed: self.seed,
@@ -97,6 +101,9 @@ impl ScanRequest {
 
     fn protocol(&self) -> Result<Protocol, ScanError> {
         let Some(path) = &self.protocol else { return Ok(Protocol::femoral()) };
+        if let Some(known) = path.to_str().and_then(Protocol::of_library).filter(|_| !path.exists()) {
+            return Ok(known);
+        }
         let text = std::fs::read_to_string(path)
             .map_err(|source| ScanError::Protocol { path: path.clone(), source })?;
         let name =

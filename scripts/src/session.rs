@@ -4,9 +4,11 @@
 //! and every tick of it is recorded. Protocols, the command line and (later) the console speak to this and to nothing
 //! below it.
 
+mod calibrate;
 mod cell;
 mod error;
 mod figures;
+mod locate;
 mod motion;
 mod recorded;
 mod recorder;
@@ -14,6 +16,7 @@ mod report;
 mod scan;
 mod teach;
 mod truth;
+mod visit;
 
 use std::path::{Path as FilePath, PathBuf};
 use std::sync::Arc;
@@ -22,8 +25,10 @@ use probepath_frames::Stamp;
 use probepath_robot::{Guard, MotionLimits, Operator};
 use probepath_us_capture::exam::{Attachment, Event, ExamHeader, ExamWriter, Level, Pace, Written};
 
+pub use calibrate::{CalibrateWish, Calibrated, Checked};
 pub use cell::{CellFile, ForceFile, LimitsFile};
 pub use error::SessionError;
+pub use locate::Located;
 pub use recorded::protocol_of;
 pub(crate) use recorded::row as recorded_row;
 pub(crate) use report::SEGMENTS;
@@ -31,7 +36,8 @@ pub use report::{ReportWish, Segment};
 pub(crate) use scan::SCAN_FIGURES;
 pub use scan::{Lumen, Scan, ScanWish};
 pub use teach::TeachWish;
-pub use truth::StenosisError;
+pub use truth::{CalibrationTruth, StenosisError};
+pub use visit::{CalibrationPlan, PhantomImages, VisitWish, Visits};
 
 use crate::progress::Progress;
 use crate::protocol::Protocol;
@@ -125,6 +131,11 @@ impl Session {
     /// Every true stenosis inside a reconstruction, beside what was found; only a simulated cell can say.
     pub fn stenosis_errors(&self, lumen: &Lumen) -> Vec<StenosisError> {
         truth::stenoses(self.cell.simulated.truth(), &lumen.recon)
+    }
+
+    /// How far a calibration is from where the image truly is; only a simulated cell can say.
+    pub fn calibration_error(&self, calibrated: &Calibrated) -> CalibrationTruth {
+        truth::calibration_error(&self.cell.simulated, calibrated)
     }
 
     /// RMS error of the force that the skin truly felt along the path (N); only a simulated cell can say.

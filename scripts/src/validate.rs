@@ -5,6 +5,7 @@
 mod bench;
 mod force;
 mod motion;
+mod table1;
 mod table2;
 
 use std::fmt;
@@ -14,6 +15,7 @@ use thiserror::Error;
 
 pub use force::force;
 pub use motion::{Shares, motion, shares};
+pub use table1::table1;
 pub use table2::table2;
 
 use crate::session::SessionError;

@@ -113,6 +113,8 @@ pub struct VisitOptions {
     pub highest_m: f64,
     /// Half the size of the probe's face, housing included: along the array and across it (m).
     pub half_face_m: [f64; 2],
+    /// Dots nearer to each other than this, along a row and along a column, flow into one (m): neither counts.
+    pub apart_m: [f64; 2],
     /// Expected standard deviation of a dot along a row and along a column (m).
     pub dot_sd_m: [f64; 2],
     /// Expected standard deviation of the arm's place, each coordinate (m), new at each pose.
@@ -156,6 +158,7 @@ impl Default for VisitOptions {
             clearance_m: 5e-3,
             highest_m: 50e-3,
             half_face_m: [0.025, 0.006],
+            apart_m: [4e-3, 1.2e-3],
             dot_sd_m: [0.15e-3, 0.08e-3],
             pose_sd_m: 0.1e-3,
             pose_sd_rad: 0.3e-3,
@@ -169,7 +172,7 @@ impl Default for VisitOptions {
 
 impl Default for SweepOptions {
     fn default() -> Self {
-        Self { count: 2, speed_m_s: 0.020, length_m: 0.016, passes: 4, rate_hz: 25.0 }
+        Self { count: 2, speed_m_s: 0.020, length_m: 0.012, passes: 2, rate_hz: 25.0 }
     }
 }
 
@@ -325,6 +328,8 @@ impl VisitOptions {
             ("least_wires", self.least_wires as f64, 3.0, 100.0, "3 to 100"),
             ("clearance_mm", self.clearance_m * 1e3, 0.0, 100.0, "0 to 100 mm"),
             ("highest_mm", self.highest_m * 1e3, self.clearance_m * 1e3, 1000.0, "clearance_mm to 1000 mm"),
+            ("apart_mm (along a row)", self.apart_m[0] * 1e3, 0.0, 50.0, "0 to 50 mm"),
+            ("apart_mm (along a column)", self.apart_m[1] * 1e3, 0.0, 50.0, "0 to 50 mm"),
             ("dot_sd_mm (along a row)", self.dot_sd_m[0] * 1e3, 1e-3, 5.0, "0.001 to 5 mm"),
             ("dot_sd_mm (along a column)", self.dot_sd_m[1] * 1e3, 1e-3, 5.0, "0.001 to 5 mm"),
             ("pose_sd_mm", self.pose_sd_m * 1e3, 1e-4, 10.0, "0.0001 to 10 mm"),

@@ -11,10 +11,10 @@ use crate::options::Options;
 use crate::quantity::{Force, Length, Speed};
 use crate::session::{Lumen, ReportWish, Scan, ScanWish, Segment, Session, SessionError, TeachWish};
 
-type Outcome<T> = Result<T, Box<EvalAltResult>>;
+pub(super) type Outcome<T> = Result<T, Box<EvalAltResult>>;
 
 /// How each step is written, for messages.
-pub(super) const USAGE: &[(&str, &str)] = &[
+const USAGE: &[(&str, &str)] = &[
     ("teach", "teach(#{ study: \"LEG-007\", side: \"left\" })"),
     ("load_path", "load_path(\"femoral.path.toml\")"),
     ("save", "path.save(\"femoral.path.toml\")"),
@@ -27,9 +27,14 @@ pub(super) const USAGE: &[(&str, &str)] = &[
     ("warn", "warn(\"what the reader must know\")"),
 ];
 
+/// How every step is written.
+pub(super) fn usage() -> impl Iterator<Item = &'static (&'static str, &'static str)> {
+    USAGE.iter().chain(super::calibration::USAGE)
+}
+
 /// The steps' names, for messages.
 pub(super) fn names() -> String {
-    USAGE.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ")
+    usage().map(|(name, _)| *name).collect::<Vec<_>>().join(", ")
 }
 
 /// A taught path in a script's hands.
@@ -139,7 +144,7 @@ fn reports(engine: &mut Engine, stage: &Stage) {
 
 impl Stage {
     /// Takes one step of the session; its error keeps its type, and the script ends at the call's place.
-    fn step<T>(
+    pub(super) fn step<T>(
         &self,
         context: &NativeCallContext<'_>,
         step: impl FnOnce(&mut Session) -> Result<T, SessionError>,
@@ -153,7 +158,7 @@ impl Stage {
 }
 
 /// An error at the place of the call.
-fn wrong(context: &NativeCallContext<'_>, message: String) -> Box<EvalAltResult> {
+pub(super) fn wrong(context: &NativeCallContext<'_>, message: String) -> Box<EvalAltResult> {
     Box::new(EvalAltResult::ErrorRuntime(Dynamic::from(message), context.call_position()))
 }
 

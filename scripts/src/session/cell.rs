@@ -6,7 +6,7 @@ use probepath_frames::{Direction, Point, Span, World};
 use probepath_robot::{
     Arm, Guard, GuardLimits, Joints, Model, MotionLimits, Operator, Plane, Workspace, probe_place,
 };
-use probepath_sim::{CellConfig, SimulatedCell};
+use probepath_sim::{Bench, CellConfig, SimulatedCell};
 use probepath_us_capture::{BScanSource, Calibration, CalibrationError};
 use serde::{Deserialize, Serialize};
 
@@ -76,6 +76,12 @@ impl Default for ForceFile {
 }
 
 impl CellFile {
+    /// The simulated bench with a phantom of wires in water.
+    pub fn wire_phantom() -> Self {
+        let simulated = CellConfig::wire_phantom();
+        Self { name: "simulated calibration bench".into(), simulated, ..Self::default() }
+    }
+
     /// The cell of a file.
     ///
     /// # Errors
@@ -140,6 +146,8 @@ pub(super) struct Cell {
     pub(super) limits: MotionLimits,
     pub(super) calibration: Calibration,
     pub(super) urdf: String,
+    /// The wire phantom on the table, where there is one, as its drawing and a tape measure have it.
+    pub(super) bench: Option<Bench>,
     /// The simulated cell behind arm and machine: its hand teaches, its truth is asked after the reconstruction.
     pub(super) simulated: SimulatedCell,
 }
@@ -178,6 +186,7 @@ impl Cell {
             arm: Box::new(simulated.arm()),
             machine: Box::new(simulated.machine()),
             urdf: nominal.urdf.to_owned(),
+            bench: nominal.bench.clone(),
             facts,
             limits,
             calibration,

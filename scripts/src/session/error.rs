@@ -7,6 +7,9 @@ use probepath_robot::RunError;
 use probepath_sim::CellError;
 use probepath_teach_replay::{GuideError, PathError, PlanError, ReplayError};
 use probepath_us_capture::exam::ExamError;
+use probepath_us_capture::plan::NoPlan;
+use probepath_us_capture::shots::BadShots;
+use probepath_us_capture::spatial::SpatialError;
 use probepath_us_capture::{BadCalibration, CaptureError};
 use thiserror::Error;
 
@@ -93,6 +96,21 @@ pub enum SessionError {
     /// No lumen.
     #[error("reconstruction: {0}")]
     Reconstruction(#[from] ReconError),
+    /// The cell has no phantom to calibrate on.
+    #[error("the cell has no wire phantom: name one under [simulated.subject.wire_phantom] in the cell's file")]
+    NoPhantom,
+    /// No plan for a calibration.
+    #[error("nothing was moved: {0}")]
+    NoPlan(#[from] NoPlan),
+    /// Nothing was seen.
+    #[error("no B-scan came: is the ultrasound machine on, and not frozen?")]
+    NoImages,
+    /// B-scans that cannot be calibrated from.
+    #[error(transparent)]
+    Shots(#[from] BadShots),
+    /// The images gave no calibration.
+    #[error("calibration: {0}")]
+    Spatial(#[from] SpatialError),
     /// A step before the one it needs.
     #[error("{0}")]
     Order(&'static str),

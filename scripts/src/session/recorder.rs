@@ -3,7 +3,7 @@
 
 use std::borrow::Cow;
 
-use probepath_frames::{Base, Flange, Pose, Probe, Span, Stamp, World};
+use probepath_frames::{Base, Flange, Pose, Probe, Span, Stamp, Track, World};
 use probepath_robot::{Arm, ArmFault, Command, Joints, Model, Observer, Operator, State, Tick, Wish};
 use probepath_teach_replay::{Recording, Sample};
 use probepath_us_capture::exam::{ExamWriter, Row, TickRecord};
@@ -19,6 +19,8 @@ pub(super) struct Stand {
     pub(super) phase: &'static str,
     /// How far along the path (m), where there is one.
     pub(super) along_m: Option<f64>,
+    /// Whether what is seen now counts.
+    pub(super) look: bool,
     /// How much of the step is done, 0 to 1.
     pub(super) fraction: f64,
 }
@@ -92,12 +94,14 @@ pub(super) struct Eye<'a> {
     pub(super) operator: &'a Operator,
     /// Whether it was the silence that paused, and not a person.
     pub(super) paused: bool,
-    /// The last tick on the path, once there was one.
-    pub(super) followed: Option<Stamp>,
+    /// The last tick at which what is seen counted, once there was one.
+    pub(super) looked: Option<Stamp>,
+    /// No machine is later with a B-scan.
+    pub(super) latest: Span,
 }
 
 /// No machine is later with a B-scan.
-const LATEST: Span = Span::from_milliseconds(500);
+pub(super) const LATEST: Span = Span::from_milliseconds(500);
 
 /// A machine that is silent for longer than this ends the scan.
 const LONGEST_SILENCE: Span = Span::from_milliseconds(5000);
@@ -110,6 +114,8 @@ pub(super) struct Recorder<'a> {
     pub(super) step: &'static str,
     pub(super) stand: &'a dyn Fn() -> Stand,
     pub(super) recording: Option<&'a mut Recording>,
+    /// Where the probe was at every tick.
+    pub(super) track: Option<&'a mut Track<World, Probe>>,
     pub(super) eye: Option<Eye<'a>>,
     pub(super) figures: Option<&'a mut Figures>,
     /// The last tick's stamp.
@@ -142,20 +148,27 @@ impl Observer for Recorder<'_> {
         if let Some(fault) = self.exam.fault() {
             return Wish::Stop(format!("the exam cannot be recorded: {fault}"));
         }
-        let Some(eye) = &mut self.eye else { return Wish::GoOn };
         let world_from_probe = self.facts.world_from_base * base_from_probe;
-        let looked = match stand.along_m {
-            Some(_) => eye.look(state, world_from_probe, self.exam),
-            None => eye.wait(state.stamp, self.exam),
+        if let Some(track) = &mut self.track
+            && let Err(error) = track.push(state.stamp, world_from_probe)
+        {
+            return Wish::Stop(error.to_string());
+        }
+        let Some(eye) = &mut self.eye else { return Wish::GoOn };
+        let looked = if stand.look {
+            eye.look(state, world_from_probe, self.exam)
+        } else {
+            eye.wait(state.stamp, self.exam)
         };
         looked.unwrap_or_else(|error| Wish::Stop(error.to_string()))
     }
 }
 
 impl Eye<'_> {
-    /// Before and after the path nothing is looked at, but for B-scans that were formed on it and arrive late.
+    /// Before, after and between nothing is looked at, but for B-scans that were formed when it counted and arrive
+    /// late.
     fn wait(&mut self, now: Stamp, exam: &ExamWriter) -> Result<Wish, CaptureError> {
-        if self.followed.is_some_and(|last| now - last < LATEST) {
+        if self.looked.is_some_and(|last| now - last < self.latest) {
             self.take(now, exam)?;
         } else {
             self.machine.skip(now)?;
@@ -180,7 +193,10 @@ impl Eye<'_> {
         world_from_probe: Pose<World, Probe>,
         exam: &ExamWriter,
     ) -> Result<Wish, CaptureError> {
-        self.followed = Some(state.stamp);
+        if self.looked.is_none_or(|last| state.stamp - last > self.latest) {
+            self.capture.listen(state.stamp);
+        }
+        self.looked = Some(state.stamp);
         self.capture.tick(state.stamp, world_from_probe, Some(state.wrench))?;
         self.take(state.stamp, exam)?;
         match self.capture.stalled(state.stamp) {

@@ -13,7 +13,7 @@ use probepath_us_capture::exam::Attachment;
 use probepath_us_capture::{Capture, Counts, Keeping, PlacedBScan};
 
 use super::figures::Figures;
-use super::recorder::{Eye, Recorder, Stand, Taped};
+use super::recorder::{Eye, LATEST, Recorder, Stand, Taped};
 use super::{Session, SessionError, motion};
 use crate::report::PathFigures;
 use crate::report::build::{ReportError, ScanFigures};
@@ -166,7 +166,7 @@ impl Session {
         };
         // Where the arm says it was last told to be; asking is an exchange like any other, and is kept like one.
         let exam = self.exam.as_ref().ok_or(SessionError::Order("the exam was not begun"))?;
-        let stand = || Stand { phase: "plan", along_m: None, fraction: 0.0 };
+        let stand = || Stand { phase: "plan", along_m: None, look: false, fraction: 0.0 };
         let mut taped = Taped { arm: &mut *self.cell.arm, exam, facts: &self.cell.facts, stand: &stand };
         let state = motion::ask("planning", &mut taped)?;
         self.now = state.stamp;
@@ -201,7 +201,8 @@ impl Session {
             images,
             operator: &operator,
             paused: false,
-            followed: None,
+            looked: None,
+            latest: LATEST,
         });
         let mut recorder = Recorder {
             exam,
@@ -210,6 +211,7 @@ impl Session {
             step: "scanning",
             stand: &stand,
             recording: None,
+            track: None,
             eye,
             figures: Some(figures),
             now: self.now,
@@ -232,7 +234,7 @@ impl Session {
     fn lift(&mut self) -> Result<(), SessionError> {
         const STEP: &str = "lifting off";
         let exam = self.exam.as_ref().ok_or(SessionError::Order("the exam was not begun"))?;
-        let stand = || Stand { phase: "lift", along_m: None, fraction: 1.0 };
+        let stand = || Stand { phase: "lift", along_m: None, look: false, fraction: 1.0 };
         let mut lift = LiftOff::new(self.cell.probe_arm(), LIFT_M, LIFT_M_S).map_err(ReplayError::from)?;
         let facts = &self.cell.facts;
         let mut taped = Taped { arm: &mut *self.cell.arm, exam, facts, stand: &stand };
@@ -244,7 +246,7 @@ impl Session {
     }
 
     /// What the capture still held back at the end.
-    fn keep_rest(&mut self, capture: &mut Capture, images: &mut Vec<PlacedBScan>) {
+    pub(super) fn keep_rest(&mut self, capture: &mut Capture, images: &mut Vec<PlacedBScan>) {
         while let Some(placed) = capture.take() {
             if let Some(exam) = &self.exam {
                 exam.bscan(placed.clone());
@@ -278,5 +280,5 @@ fn stand_of(status: &ReplayStatus, length: f64) -> Stand {
         ReplayPhase::Done => "done",
     };
     let along_m = matches!(status.phase, ReplayPhase::Follow).then_some(status.at_m);
-    Stand { phase, along_m, fraction: status.at_m / length.max(1e-9) }
+    Stand { phase, along_m, look: along_m.is_some(), fraction: status.at_m / length.max(1e-9) }
 }

@@ -28,7 +28,7 @@ impl Default for TeachWish {
 /// Room for ten minutes of guiding at 500 ticks a second.
 const MOST_SAMPLES: usize = 300_000;
 
-const TEACHING: Stand = Stand { phase: "teach", along_m: None, fraction: 0.0 };
+const TEACHING: Stand = Stand { phase: "teach", along_m: None, look: false, fraction: 0.0 };
 
 impl Session {
     /// The operator guides the probe along the artery; what comes back is the cleaned path.
@@ -79,6 +79,7 @@ impl Session {
             step: "teaching",
             stand: &stand,
             recording: Some(recording),
+            track: None,
             eye: None,
             figures: None,
             now: self.now,

@@ -2,10 +2,11 @@
 //! reconstruction has given its answer; nothing here flows back into it.
 
 use probepath_recon::{Fit, LumenReconstruction, Mesh, compare};
-use probepath_sim::{Truth, Vessel};
+use probepath_sim::{SimulatedCell, Truth, Vessel};
 use serde::Serialize;
 
-use super::Scan;
+use super::calibrate::apart;
+use super::{Calibrated, Scan};
 use crate::report::SurfaceError;
 
 /// How much true surface lies beyond the reconstructed one at both ends (m), so that no end is compared with an edge.
@@ -95,4 +96,38 @@ pub(super) fn force_rms(truth: &Truth, scan: &Scan) -> Option<f64> {
         .map(|moment| (-moment.skin.force.z - set).powi(2))
         .collect();
     (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+}
+
+/// How far a calibration is from the truth.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct CalibrationTruth {
+    /// Distance of a pixel's place in the probe from where it truly was in the water: mean over the image (mm).
+    pub mean_mm: f64,
+    /// Its 95th percentile over the image (mm).
+    pub p95_mm: f64,
+    /// Its root mean square over the image (mm).
+    pub rms_mm: f64,
+    /// The mean for scanning tissue, as the calibration is stored: mean over the image (mm).
+    pub in_tissue_mean_mm: f64,
+    /// Error of the lag (ms).
+    pub lag_ms: f64,
+}
+
+/// How far a calibration is from where the image truly is.
+pub(super) fn calibration_error(cell: &SimulatedCell, calibrated: &Calibrated) -> CalibrationTruth {
+    let (truth, fit, size) = (cell.truth(), &calibrated.spatial.fit, calibrated.size);
+    let (seen, spacing) = truth.seen_from_image(&calibrated.setting);
+    let [mean, p95, rms] = apart((&fit.probe_from_image, fit.spacing), (&seen, spacing), size);
+    let machines = calibrated.setting.spacing;
+    let in_tissue = truth.probe_from_image(&calibrated.setting);
+    let tissue = apart((&calibrated.in_tissue(), machines), (&in_tissue, machines), size);
+    // The machine stamps by the latency in the cell's file: what that is short of the truth is what images are late.
+    let late = truth.image_latency().seconds() - cell.nominal().image_latency.seconds();
+    CalibrationTruth {
+        mean_mm: mean * 1e3,
+        p95_mm: p95 * 1e3,
+        rms_mm: rms * 1e3,
+        in_tissue_mean_mm: tissue[0] * 1e3,
+        lag_ms: (fit.lag.seconds() + late) * 1e3,
+    }
 }

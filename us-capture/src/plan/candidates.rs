@@ -8,7 +8,7 @@ use super::information::{Information, View};
 use super::{Bench, NoPlan, Refused, VisitOptions};
 
 /// Steps from end to end of the phantom, and of the window.
-const ALONG: [f64; 3] = [-0.3, 0.0, 0.3];
+const ALONG: [f64; 3] = [-0.2, 0.0, 0.2];
 const ACROSS: [f64; 5] = [-0.5, -0.25, 0.0, 0.25, 0.5];
 const BESIDE: [f64; 3] = [-1.0, 0.0, 1.0];
 /// More candidates than this are thinned out evenly: choosing takes time.

@@ -155,24 +155,33 @@ impl<'a> View<'a> {
         Self { bench, options }
     }
 
-    /// The wires that cut the window, by index.
+    /// The wires that cut the window and whose dots stand alone, by index.
     pub(super) fn wires(&self, world_from_probe: &Pose<World, Probe>) -> Vec<usize> {
         let image_from_phantom =
             self.image_from_phantom(world_from_probe, &Vector3::zeros(), &Unknowns::zeros());
-        let spacing = self.bench.setting.spacing;
-        let (right, bottom) =
-            (self.bench.size.0 as f64 * spacing.x_m, self.bench.size.1 as f64 * spacing.y_m);
-        // A dot nearer to the edge than this is cut (m): its tails are three standard deviations of a point spread long.
-        let edge = [1.5e-3, 0.8e-3];
-        let shows = |wire: &Wire| {
-            crossing(&image_from_phantom, wire).is_some_and(|(at, share)| {
-                (0.0..=1.0).contains(&share)
-                    && (edge[0]..=right - edge[0]).contains(&at.x)
-                    && (edge[1]..=bottom - edge[1]).contains(&at.y)
-            })
-        };
         let wires = self.bench.phantom.wires.iter().enumerate();
-        wires.filter(|(_, wire)| shows(wire)).map(|(i, _)| i).collect()
+        let crossing = |(i, wire): (usize, &Wire)| {
+            crossing(&image_from_phantom, wire)
+                .filter(|(_, share)| (0.0..=1.0).contains(share))
+                .map(|(at, _)| (i, at))
+        };
+        let dots: Vec<(usize, Vector2<f64>)> = wires.filter_map(crossing).collect();
+        let [across, down] = self.options.apart_m;
+        let merges = |at: &Vector2<f64>, other: &Vector2<f64>| {
+            (at.x - other.x).abs() < across && (at.y - other.y).abs() < down
+        };
+        let alone = |(i, at): &&(usize, Vector2<f64>)| {
+            dots.iter().all(|(other, place)| other == i || !merges(at, place))
+        };
+        dots.iter().filter(|(_, at)| self.inside(at)).filter(alone).map(|(i, _)| *i).collect()
+    }
+
+    /// Whether a dot there would be whole: its tails are three standard deviations of a point spread long.
+    fn inside(&self, at: &Vector2<f64>) -> bool {
+        const EDGE_M: [f64; 2] = [1.5e-3, 0.8e-3];
+        let (size, spacing) = (self.bench.size, self.bench.setting.spacing);
+        let (right, bottom) = (size.0 as f64 * spacing.x_m, size.1 as f64 * spacing.y_m);
+        (EDGE_M[0]..=right - EDGE_M[0]).contains(&at.x) && (EDGE_M[1]..=bottom - EDGE_M[1]).contains(&at.y)
     }
 
     /// The information of the images at one pose, the arm's error shared among them.

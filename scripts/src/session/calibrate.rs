@@ -1,0 +1,243 @@
+//! The calibration step: B-scans of a phantom become a calibration, and other B-scans say how good it is.
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use probepath_frames::{Image, Pose, Probe, Span};
+use probepath_us_capture::exam::Attachment;
+use probepath_us_capture::fit::{Lag, PhantomPlace, Scale};
+use probepath_us_capture::spatial::{Doing, Evaluation, Spatial, SpatialOptions};
+use probepath_us_capture::{Calibration, CalibrationError, PixelSpacing, Setting};
+use serde::Serialize;
+
+use super::{PhantomImages, Session, SessionError};
+
+/// What scanners take for the speed of sound (m/s).
+const ASSUMED_M_S: f64 = 1540.0;
+/// How well a thermometer in the bath is read (Celsius).
+const THERMOMETER_SD: f64 = 0.5;
+/// No machine's stated latency is further off than this (s).
+const MOST_LAG_S: f64 = 0.5;
+
+/// How a calibration is to be made.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CalibrateWish {
+    /// How warm the water is (degrees Celsius); what the cell says otherwise.
+    pub water_celsius: Option<f64>,
+}
+
+/// A calibration that was made here.
+#[derive(Clone, Debug)]
+pub struct Calibrated {
+    /// The fit, and what was seen of every image.
+    pub spatial: Spatial,
+    /// How the machine was set.
+    pub setting: Setting,
+    /// Columns and rows of an image.
+    pub size: (usize, usize),
+    /// What has been found on images that it has not used.
+    pub held: Option<Evaluation>,
+}
+
+/// How good a calibration is: on images that it has not used (lengths in mm).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Checked {
+    /// Images.
+    pub images: usize,
+    /// Images whose wires were found.
+    pub labelled: usize,
+    /// Distance of the Zs' middle wires from where they should be: mean of the best 95 %, and their SD (mm).
+    pub mid_mean95_mm: f64,
+    /// See `mid_mean95_mm`.
+    pub mid_sd95_mm: f64,
+    /// The same, root mean square of all (mm).
+    pub mid_rms_mm: f64,
+    /// Distance of every dot from its wire, root mean square (mm).
+    pub line_rms_mm: f64,
+}
+
+impl Checked {
+    fn of(evaluation: &Evaluation) -> Self {
+        Self {
+            images: evaluation.images,
+            labelled: evaluation.labelled,
+            mid_mean95_mm: evaluation.mid.mean95_m * 1e3,
+            mid_sd95_mm: evaluation.mid.sd95_m * 1e3,
+            mid_rms_mm: evaluation.mid.rms_m * 1e3,
+            line_rms_mm: evaluation.line.rms_m * 1e3,
+        }
+    }
+}
+
+impl std::fmt::Display for Checked {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "{} of {} images labelled; Z-fiducials {:.2} ± {:.2} mm (best 95 %), {:.2} mm RMS; wires {:.2} mm RMS",
+            self.labelled, self.images, self.mid_mean95_mm, self.mid_sd95_mm, self.mid_rms_mm, self.line_rms_mm
+        )
+    }
+}
+
+impl Calibrated {
+    /// Standard error of a reconstructed point over the image, as the fit says it: mean and 95th percentile (m).
+    pub fn standard_error_m(&self) -> (f64, f64) {
+        let map = self.spatial.fit.uncertainty.standard_error_map(self.size.0, self.size.1);
+        (map.mean_m(), map.p95_m())
+    }
+
+    /// The same, root mean square over the image (m).
+    pub fn standard_error_rms_m(&self) -> f64 {
+        let map = self.spatial.fit.uncertainty.standard_error_map(self.size.0, self.size.1);
+        let squares = map.errors_m.iter().map(|error| error * error);
+        (squares.sum::<f64>() / map.errors_m.len().max(1) as f64).sqrt()
+    }
+
+    /// Where the image's plane is for scanning tissue, with the machine's own spacing. In water sound is slower than
+    /// the machine assumes, so that the first row was less deep under the face, in the ratio of the rows' sizes.
+    pub fn in_tissue(&self) -> Pose<Probe, Image> {
+        let shown = self.spatial.fit.spacing.y_m / self.setting.spacing.y_m;
+        let first_row_m = self.setting.window_top_m + self.setting.spacing.y_m / 2.0;
+        let deeper = Translation3::new(0.0, first_row_m * (1.0 - shown), 0.0);
+        // FRAMES: the same axes, the first row's centre as deep as it is in tissue.
+        let moved = Pose::<Image, Image>::assume(Isometry3::from_parts(deeper, UnitQuaternion::identity()));
+        self.spatial.fit.probe_from_image * moved
+    }
+
+    /// What was found: on images that it has not used, or, unchecked, on its own.
+    pub fn found(&self) -> Checked {
+        Checked::of(self.held.as_ref().unwrap_or(&self.spatial.evaluation))
+    }
+
+    /// As it is stored, for scanning tissue.
+    pub fn stored(&self, date: Option<&str>) -> Calibration {
+        let found = self.found();
+        let phantom = self.spatial.phantom().name.clone();
+        let (depth, focus) = (self.setting.depth_m * 1e3, self.setting.focus_m * 1e3);
+        Calibration {
+            id: format!("{phantom}, depth {depth:.0} mm, focus {focus:.0} mm"),
+            date: date.unwrap_or("simulated").to_owned(),
+            phantom,
+            probe_from_image: self.in_tissue(),
+            setting: self.setting,
+            image_lag: self.spatial.fit.lag,
+            error: CalibrationError {
+                rms_mm: found.mid_rms_mm,
+                sd_mm: found.mid_sd95_mm,
+                held_out: self.held.is_some(),
+            },
+        }
+    }
+}
+
+impl Session {
+    /// Calibrates from B-scans of a phantom: where the image's plane is on the probe, when images are formed, and a
+    /// small correction of the phantom's place, from every wire that is seen.
+    ///
+    /// # Errors
+    /// When too few images show the phantom, or something stays undetermined; the error says what to do.
+    pub fn calibrate(
+        &mut self,
+        images: &PhantomImages,
+        wish: &CalibrateWish,
+    ) -> Result<Calibrated, SessionError> {
+        let options = self.spatial_options(images, wish);
+        let progress = self.opening.progress.clone();
+        let watch = move |doing: Doing| match doing {
+            Doing::Looking { done, of } => progress.at("looking for wires", done as f64 / of.max(1) as f64),
+            Doing::Fitting { .. } => progress.at("calibrating", 1.0),
+        };
+        let spatial = Spatial::calibrate(&images.shots, &images.located.phantom, &options, &watch)?;
+        let calibrated = Calibrated {
+            spatial,
+            setting: images.setting,
+            size: images.shots.size(),
+            held: None,
+        };
+        let ((mean, p95), evaluation) = (calibrated.standard_error_m(), &calibrated.spatial.evaluation);
+        self.say(&format!(
+            "Calibrated from {} of {} images: standard error {:.3} mm over the image, {:.3} mm at its 95th \
+             percentile; lag {:.1} ms.",
+            evaluation.labelled,
+            evaluation.images,
+            mean * 1e3,
+            p95 * 1e3,
+            calibrated.spatial.fit.lag.seconds() * 1e3
+        ));
+        for weak in &calibrated.spatial.fit.weak {
+            self.warn(&weak.to_string());
+        }
+        Ok(calibrated)
+    }
+
+    fn spatial_options(&self, images: &PhantomImages, wish: &CalibrateWish) -> SpatialOptions {
+        let located = &images.located;
+        let place = PhantomPlace::Prior {
+            pose: located.world_from_phantom,
+            sd_m: located.sd_m,
+            sd_rad: located.sd_rad,
+        };
+        SpatialOptions {
+            spacing: Some(images.setting.spacing),
+            scale: Scale::SpeedOfSound {
+                water_celsius: wish.water_celsius.unwrap_or(located.water_celsius),
+                sd_celsius: THERMOMETER_SD,
+                assumed_m_s: ASSUMED_M_S,
+            },
+            lag: Lag::Estimated {
+                from: Span::from_seconds(-MOST_LAG_S),
+                to: Span::from_seconds(MOST_LAG_S),
+            },
+            nominal: Some(self.cell.calibration.probe_from_image),
+            ..SpatialOptions::new(place)
+        }
+    }
+
+    /// How good a calibration is on images that it has not used.
+    ///
+    /// # Errors
+    /// When the images are of another size, or none shows the phantom.
+    pub fn check_calibration(
+        &mut self,
+        calibrated: &Calibrated,
+        others: &PhantomImages,
+    ) -> Result<Calibrated, SessionError> {
+        let held = calibrated.spatial.evaluate(&others.shots, &|_| {})?;
+        let checked = Checked::of(&held.evaluation);
+        self.say(&format!("Checked on images it had not used: {checked}."));
+        Ok(Calibrated { held: Some(held.evaluation), ..calibrated.clone() })
+    }
+
+    /// Writes a calibration into the session's folder, and keeps it in the exam.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn save_calibration(&mut self, calibrated: &Calibrated, name: &str) -> Result<(), SessionError> {
+        let stored = calibrated.stored(self.opening.date.as_deref());
+        let path = self.file(name);
+        stored.write(&path)?;
+        if let Some(exam) = &self.exam {
+            exam.attach(Attachment::new(name, "application/toml", stored.to_toml()?.into_bytes()));
+        }
+        self.say(&format!("The calibration is in {}.", path.display()));
+        Ok(())
+    }
+}
+
+/// How far the pixels of one calibration are from those of another over an image: mean, 95th percentile, and root mean
+/// square (m).
+pub(super) fn apart(
+    (ours, our_spacing): (&Pose<Probe, Image>, PixelSpacing),
+    (theirs, their_spacing): (&Pose<Probe, Image>, PixelSpacing),
+    (columns, rows): (usize, usize),
+) -> [f64; 3] {
+    const GRID: usize = 17;
+    let step = |pixels: usize| pixels.saturating_sub(1) as f64 / (GRID - 1) as f64;
+    let at = |i: usize| {
+        let (u, v) = ((i % GRID) as f64 * step(columns), (i / GRID) as f64 * step(rows));
+        (*ours * our_spacing.point(u, v)).distance(&(*theirs * their_spacing.point(u, v)))
+    };
+    let mut distances: Vec<f64> = (0..GRID * GRID).map(at).collect();
+    distances.sort_by(f64::total_cmp);
+    let p95 = distances.get(distances.len() * 95 / 100).copied().unwrap_or(f64::NAN);
+    let mean = |power: i32| distances.iter().map(|d| d.powi(power)).sum::<f64>() / distances.len() as f64;
+    [mean(1), p95, mean(2).sqrt()]
+}
