@@ -105,8 +105,10 @@ pub struct VisitOptions {
     pub tilt_rad: f64,
     /// The farthest turn about the beam (rad).
     pub turn_rad: f64,
-    /// Wires that have to lie in the window at each pose.
+    /// Wires that should lie in the window at each pose.
     pub least_wires: usize,
+    /// Wires that have to, where a small window leaves too few poses otherwise.
+    pub fewest_wires: usize,
     /// What the face keeps above the highest wire (m): more than the plates stand out.
     pub clearance_m: f64,
     /// How far above the highest wire the face may be (m): less than the water stands there.
@@ -146,33 +148,45 @@ pub struct SweepOptions {
     pub rate_hz: f64,
 }
 
+impl VisitOptions {
+    /// 24 poses tilted by 18 degrees and turned by 10, 12 others, two sweeps; dots good to a tenth of a millimetre, an
+    /// arm to another.
+    pub const DEFAULT: Self = Self {
+        poses: 24,
+        held_out: 12,
+        images_per_pose: 3,
+        tilt_rad: 18f64.to_radians(),
+        turn_rad: 10f64.to_radians(),
+        least_wires: 6,
+        fewest_wires: 4,
+        clearance_m: 5e-3,
+        highest_m: 50e-3,
+        half_face_m: [0.025, 0.006],
+        apart_m: [4e-3, 1.2e-3],
+        dot_sd_m: [0.15e-3, 0.08e-3],
+        pose_sd_m: 0.1e-3,
+        pose_sd_rad: 0.3e-3,
+        place_sd_m: 2e-3,
+        place_sd_rad: 0.02,
+        scale_sd: 0.0,
+        sweep: SweepOptions::DEFAULT,
+    };
+}
+
+impl SweepOptions {
+    /// Two sweeps of 12 mm at 20 mm/s, there and back.
+    pub const DEFAULT: Self = Self { count: 2, speed_m_s: 0.020, length_m: 0.012, passes: 2, rate_hz: 25.0 };
+}
+
 impl Default for VisitOptions {
     fn default() -> Self {
-        Self {
-            poses: 24,
-            held_out: 12,
-            images_per_pose: 3,
-            tilt_rad: 18f64.to_radians(),
-            turn_rad: 10f64.to_radians(),
-            least_wires: 6,
-            clearance_m: 5e-3,
-            highest_m: 50e-3,
-            half_face_m: [0.025, 0.006],
-            apart_m: [4e-3, 1.2e-3],
-            dot_sd_m: [0.15e-3, 0.08e-3],
-            pose_sd_m: 0.1e-3,
-            pose_sd_rad: 0.3e-3,
-            place_sd_m: 2e-3,
-            place_sd_rad: 0.02,
-            scale_sd: 0.0,
-            sweep: SweepOptions::default(),
-        }
+        Self::DEFAULT
     }
 }
 
 impl Default for SweepOptions {
     fn default() -> Self {
-        Self { count: 2, speed_m_s: 0.020, length_m: 0.012, passes: 2, rate_hz: 25.0 }
+        Self::DEFAULT
     }
 }
 
@@ -275,6 +289,9 @@ pub enum NoPlan {
     },
 }
 
+/// Candidates for each pose that is wanted: fewer leave no choice.
+const ENOUGH: usize = 5;
+
 impl VisitPlan {
     /// The poses, among those that show enough wires, keep clear of them and can be reached, that make the expected
     /// standard error of a reconstructed point over the image small: chosen one by one, then exchanged while that helps
@@ -291,7 +308,13 @@ impl VisitPlan {
         reachable: impl Fn(&Pose<World, Probe>) -> bool,
     ) -> Result<Self, NoPlan> {
         options.check()?;
-        let mut candidates = Candidates::new(bench, options)?;
+        let mut candidates = Candidates::new(bench, options, options.least_wires)?;
+        for wires in (options.fewest_wires..options.least_wires).rev() {
+            if candidates.free().count() >= ENOUGH * (options.poses + options.held_out) {
+                break;
+            }
+            candidates = Candidates::new(bench, options, wires)?;
+        }
         let prior = information::prior(options);
         let goal = information::over_the_image(bench);
         let mut chosen = choose::best(&mut candidates, &prior, &goal, options.poses, &reachable)?;
@@ -326,6 +349,7 @@ impl VisitOptions {
             ("tilt_deg", self.tilt_rad.to_degrees(), 0.0, 45.0, "0 to 45 degrees"),
             ("turn_deg", self.turn_rad.to_degrees(), 0.0, 45.0, "0 to 45 degrees"),
             ("least_wires", self.least_wires as f64, 3.0, 100.0, "3 to 100"),
+            ("fewest_wires", self.fewest_wires as f64, 3.0, self.least_wires as f64, "3 to least_wires"),
             ("clearance_mm", self.clearance_m * 1e3, 0.0, 100.0, "0 to 100 mm"),
             ("highest_mm", self.highest_m * 1e3, self.clearance_m * 1e3, 1000.0, "clearance_mm to 1000 mm"),
             ("apart_mm (along a row)", self.apart_m[0] * 1e3, 0.0, 50.0, "0 to 50 mm"),

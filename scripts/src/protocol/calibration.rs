@@ -9,9 +9,7 @@ use super::Stage;
 use super::steps::{Outcome, wrong};
 use crate::options::Options;
 use crate::quantity::{Angle, Duration, Length, Speed, Temperature};
-use crate::session::{
-    CalibrateWish, Calibrated, CalibrationPlan, Located, PhantomImages, VisitWish, Visits,
-};
+use crate::session::{CalibrateWish, Calibrated, CalibrationPlan, Located, PhantomImages, VisitWish, Visits};
 
 /// How each step is written, for messages.
 pub(super) const USAGE: &[(&str, &str)] = &[

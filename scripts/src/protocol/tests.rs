@@ -103,3 +103,13 @@ fn the_femoral_protocol_can_be_read() {
     engine(&stage, &Operator::new()).compile(FEMORAL).unwrap();
     std::fs::remove_dir_all(out).unwrap();
 }
+
+#[test]
+fn protocols_that_come_along_are_found_by_name() {
+    for name in ["calibrate", "calibrate.rhai"] {
+        let protocol = Protocol::of_library(name).unwrap();
+        assert!(protocol.is_calibration() && protocol.name == "calibrate.rhai");
+    }
+    assert_eq!(Protocol::of_library("femoral"), Some(Protocol::femoral()));
+    assert_eq!(Protocol::of_library("tibial"), None);
+}

@@ -3,9 +3,9 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use probepath_frames::{Image, Pose, Probe, Span};
 use probepath_us_capture::exam::Attachment;
-use probepath_us_capture::fit::{Lag, PhantomPlace, Scale};
+use probepath_us_capture::fit::{Lag, PhantomPlace, Scale, speed_of_sound_in_water};
 use probepath_us_capture::spatial::{Doing, Evaluation, Spatial, SpatialOptions};
-use probepath_us_capture::{Calibration, CalibrationError, PixelSpacing, Setting};
+use probepath_us_capture::{Calibration, CalibrationError, FoundMm, PixelSpacing, Quality, Setting, Water};
 use serde::Serialize;
 
 use super::{PhantomImages, Session, SessionError};
@@ -33,6 +33,8 @@ pub struct Calibrated {
     pub setting: Setting,
     /// Columns and rows of an image.
     pub size: (usize, usize),
+    /// How warm the water was (degrees Celsius).
+    pub water_celsius: f64,
     /// What has been found on images that it has not used.
     pub held: Option<Evaluation>,
 }
@@ -72,7 +74,12 @@ impl std::fmt::Display for Checked {
         write!(
             f,
             "{} of {} images labelled; Z-fiducials {:.2} ± {:.2} mm (best 95 %), {:.2} mm RMS; wires {:.2} mm RMS",
-            self.labelled, self.images, self.mid_mean95_mm, self.mid_sd95_mm, self.mid_rms_mm, self.line_rms_mm
+            self.labelled,
+            self.images,
+            self.mid_mean95_mm,
+            self.mid_sd95_mm,
+            self.mid_rms_mm,
+            self.line_rms_mm
         )
     }
 }
@@ -107,6 +114,19 @@ impl Calibrated {
         Checked::of(self.held.as_ref().unwrap_or(&self.spatial.evaluation))
     }
 
+    fn quality(&self) -> Quality {
+        let found = &self.held.as_ref().unwrap_or(&self.spatial.evaluation).found;
+        Quality {
+            found: FoundMm::of(found, self.held.is_some()),
+            water: Some(Water {
+                temperature_celsius: self.water_celsius,
+                speed_of_sound_m_s: speed_of_sound_in_water(self.water_celsius),
+                assumed_m_s: ASSUMED_M_S,
+            }),
+            ..Quality::of(&self.spatial.fit, self.size)
+        }
+    }
+
     /// As it is stored, for scanning tissue.
     pub fn stored(&self, date: Option<&str>) -> Calibration {
         let found = self.found();
@@ -124,6 +144,7 @@ impl Calibrated {
                 sd_mm: found.mid_sd95_mm,
                 held_out: self.held.is_some(),
             },
+            quality: Some(self.quality()),
         }
     }
 }
@@ -150,6 +171,7 @@ impl Session {
             spatial,
             setting: images.setting,
             size: images.shots.size(),
+            water_celsius: wish.water_celsius.unwrap_or(images.located.water_celsius),
             held: None,
         };
         let ((mean, p95), evaluation) = (calibrated.standard_error_m(), &calibrated.spatial.evaluation);
@@ -182,10 +204,7 @@ impl Session {
                 sd_celsius: THERMOMETER_SD,
                 assumed_m_s: ASSUMED_M_S,
             },
-            lag: Lag::Estimated {
-                from: Span::from_seconds(-MOST_LAG_S),
-                to: Span::from_seconds(MOST_LAG_S),
-            },
+            lag: Lag::Estimated { from: Span::from_seconds(-MOST_LAG_S), to: Span::from_seconds(MOST_LAG_S) },
             nominal: Some(self.cell.calibration.probe_from_image),
             ..SpatialOptions::new(place)
         }

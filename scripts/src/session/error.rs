@@ -97,7 +97,9 @@ pub enum SessionError {
     #[error("reconstruction: {0}")]
     Reconstruction(#[from] ReconError),
     /// The cell has no phantom to calibrate on.
-    #[error("the cell has no wire phantom: name one under [simulated.subject.wire_phantom] in the cell's file")]
+    #[error(
+        "the cell has no wire phantom: name one under [simulated.subject.wire_phantom] in the cell's file"
+    )]
     NoPhantom,
     /// No plan for a calibration.
     #[error("nothing was moved: {0}")]

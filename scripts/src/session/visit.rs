@@ -74,6 +74,9 @@ pub struct PhantomImages {
     pub counts: Counts,
 }
 
+/// B-scans, where the probe was at every tick, and what became of what came.
+type Seen = (Vec<PlacedBScan>, Track<World, Probe>, Counts);
+
 impl VisitWish {
     fn check(&self) -> Result<(), SessionError> {
         let limits = [
@@ -117,10 +120,7 @@ impl Session {
             probe_from_image: calibration.probe_from_image,
             upright: self.cell.facts.world_from_base * arm.probe(&start),
             setting,
-            size: (
-                pixels(setting.window_width_m, spacing.x_m),
-                pixels(setting.window_height_m, spacing.y_m),
-            ),
+            size: (pixels(setting.window_width_m, spacing.x_m), pixels(setting.window_height_m, spacing.y_m)),
         };
         let reachable =
             |pose: &Pose<World, Probe>| arm.posture(&(base_from_world * *pose), &start, &settings).is_ok();
@@ -207,10 +207,7 @@ impl Session {
         Ok(state.commanded)
     }
 
-    fn go_round(
-        &mut self,
-        mut round: Round,
-    ) -> Result<(Vec<PlacedBScan>, Track<World, Probe>, Counts), SessionError> {
+    fn go_round(&mut self, mut round: Round) -> Result<Seen, SessionError> {
         let mut capture = Capture::new(self.cell.calibration.clone(), Keeping::All)?;
         let (mut images, mut track) = (Vec::new(), Track::new(WIDEST_GAP));
         let latency = self.cell.simulated.nominal().image_latency;
@@ -269,7 +266,13 @@ impl Visits {
             for pass in 0..sweep.passes {
                 let end = if pass % 2 == 0 { &sweep.to } else { &sweep.from };
                 let speed_m_s = sweep.speed_m_s;
-                stops.push(Stop { speed_m_s, look_on_the_way: true, settle_s: 0.0, look_s: 0.0, ..still(end) });
+                stops.push(Stop {
+                    speed_m_s,
+                    look_on_the_way: true,
+                    settle_s: 0.0,
+                    look_s: 0.0,
+                    ..still(end)
+                });
             }
         }
         // The last images are still on their way when the last stop is done.

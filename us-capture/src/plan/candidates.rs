@@ -40,15 +40,18 @@ struct Candidate {
 pub(super) struct Candidates<'a> {
     bench: &'a Bench<'a>,
     options: &'a VisitOptions,
+    wires: usize,
     stand: Stand,
     all: Vec<Candidate>,
     pub(super) refused: Refused,
 }
 
 impl<'a> Candidates<'a> {
-    pub(super) fn new(bench: &'a Bench<'a>, options: &'a VisitOptions) -> Result<Self, NoPlan> {
+    /// Those that show at least so many wires.
+    pub(super) fn new(bench: &'a Bench<'a>, options: &'a VisitOptions, wires: usize) -> Result<Self, NoPlan> {
         let stand = Stand::of(bench)?;
-        let mut candidates = Self { bench, options, stand, all: Vec::new(), refused: Refused::default() };
+        let mut candidates =
+            Self { bench, options, wires, stand, all: Vec::new(), refused: Refused::default() };
         let mut poses: Vec<_> = candidates.grid();
         candidates.refused.considered = poses.len();
         poses.retain(|(pose, _)| candidates.is_usable(pose));
@@ -100,7 +103,7 @@ impl<'a> Candidates<'a> {
 
     /// Whether the pose shows enough and is clear of the wires, but for the arm; if not, it is counted.
     fn is_usable(&mut self, pose: &Pose<World, Probe>) -> bool {
-        if View::new(self.bench, self.options).wires(pose).len() < self.options.least_wires {
+        if View::new(self.bench, self.options).wires(pose).len() < self.wires {
             self.refused.too_few_wires += 1;
             return false;
         }
@@ -123,7 +126,7 @@ impl<'a> Candidates<'a> {
 
     /// Whether the pose shows enough and is clear, nothing counted.
     pub(super) fn shows(&self, pose: &Pose<World, Probe>) -> bool {
-        self.view().wires(pose).len() >= self.options.least_wires && self.is_clear(pose)
+        self.view().wires(pose).len() >= self.wires && self.is_clear(pose)
     }
 
     /// The phantom as the probe would see it.

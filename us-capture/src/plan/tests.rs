@@ -136,7 +136,7 @@ fn a_chosen_plan_promises_more_than_poses_picked_blindly() {
     let options = VisitOptions { held_out: 0, ..VisitOptions::default() };
     let plan = VisitPlan::new(&bench, &options, |_| true).unwrap();
     let own = expected(&bench, &options, &plan.poses);
-    let mut candidates = Candidates::new(&bench, &options).unwrap();
+    let mut candidates = Candidates::new(&bench, &options, 6).unwrap();
     let all: Vec<usize> = candidates.free().collect();
     for start in 0..20 {
         let picked = (0..24).map(|i| all[(start * 31 + i * all.len() / 24) % all.len()]);
@@ -161,7 +161,7 @@ fn no_plan_says_what_became_of_the_poses() {
     let mut bench = bench(&phantom);
     let refused = VisitPlan::new(&bench, &VisitOptions::default(), |_| false).unwrap_err();
     assert!(matches!(refused, NoPlan::TooFew { found: 0, wanted: 24, refused } if refused.unreachable > 100));
-    let many = VisitOptions { least_wires: 50, ..VisitOptions::default() };
+    let many = VisitOptions { least_wires: 50, fewest_wires: 50, ..VisitOptions::default() };
     let refused = VisitPlan::new(&bench, &many, |_| true).unwrap_err();
     assert!(refused.to_string().contains("too few wires"), "{refused}");
     let nan = VisitOptions { dot_sd_m: [f64::NAN, 1e-4], ..VisitOptions::default() };
