@@ -31,7 +31,7 @@ mod judge;
 mod look;
 mod options;
 mod relabel;
-mod vote;
+mod repeat;
 
 use crate::dots::Dot;
 use crate::fit::{Fit, PhantomPlace, Sighting, fit};
@@ -87,7 +87,9 @@ impl Spatial {
         let notes = options.notes(shots);
         let dots = look::dots(shots, options, options.spacing, watch)?;
         let labeller = Labeller::new(phantom, options.label);
-        let (mut fit, mut seen) = first::fit(shots, &dots, &labeller, phantom, options)?;
+        let (mut fit, spacing) = first::fit(shots, &dots, &labeller, phantom, options)?;
+        let options = &SpatialOptions { spacing: Some(spacing), ..options.clone() };
+        let mut seen = Vec::new();
         for round in 1..=MOST_ROUNDS {
             watch(Doing::Fitting { round });
             let again = relabel::all(shots, &dots, &labeller, &(&fit).into(), options.gate_m);
@@ -96,7 +98,7 @@ impl Spatial {
             if settled {
                 break;
             }
-            fit = refit(shots, &seen, phantom, options, &fit)?;
+            fit = refit(shots, &sightings(shots, &seen), phantom, options, &fit)?;
         }
         let evaluation = Evaluation::of(shots, &seen, phantom, &fit);
         Ok(Self { fit, seen, evaluation, notes, phantom: phantom.clone(), options: options.clone() })
@@ -132,14 +134,15 @@ pub struct Held {
 /// The fit once more, from where the last one ended.
 fn refit(
     shots: &Shots,
-    seen: &[Seen],
+    sightings: &[Sighting],
     phantom: &WirePhantom,
     options: &SpatialOptions,
     last: &Fit,
 ) -> Result<Fit, SpatialError> {
     let place = options.place.unwrap_or(PhantomPlace::Free { start: last.world_from_phantom });
-    let fit_options = options.fit(shots, options.spacing.unwrap_or(last.spacing), place, Some(last));
-    Ok(fit(phantom, &sightings(shots, seen), shots.track(), &fit_options, Some(last.probe_from_image))?)
+    let spacing = options.spacing.unwrap_or(last.spacing);
+    let options = options.fit(shots, spacing, place, Some(last));
+    Ok(fit(phantom, sightings, shots.track(), &options, Some(last.probe_from_image))?)
 }
 
 /// What the labels say to the fit; dots that an edge cuts help to label and are not measured with.

@@ -82,21 +82,8 @@ pub enum SpatialError {
         refused: Refused,
     },
     /// The images show something, but not one phantom from one probe.
-    #[error("the sequence does not agree: {0}")]
+    #[error(transparent)]
     NoAgreement(Refusal),
-    /// The image lies in the probe as a mirrored one would.
-    #[error(
-        "the image is mirrored against the nominal calibration: its {axis} axis points the other way \
-         ({angle_deg:.0} degrees off). Correct the images' orientation ({hint}), or the nominal calibration"
-    )]
-    Mirrored {
-        /// Which axis.
-        axis: &'static str,
-        /// How far off it is (degrees).
-        angle_deg: f64,
-        /// What the orientation probably is.
-        hint: &'static str,
-    },
     /// The probe stood still.
     #[error(
         "the probe moved {moved_mm:.2} mm and turned {turned_deg:.2} degrees in {images} images: poses that do not move \
@@ -109,6 +96,12 @@ pub enum SpatialError {
         moved_mm: f64,
         /// Farthest turned from the first pose (degrees).
         turned_deg: f64,
+    },
+    /// One calibration repeats nothing.
+    #[error("{calibrations} calibrations have no spread: ask for two or more")]
+    NothingToCompare {
+        /// How many were asked for.
+        calibrations: usize,
     },
     /// The fit.
     #[error(transparent)]

@@ -5,7 +5,7 @@ use probepath_frames::{Image, Phantom, Pose, Probe, Span, World};
 use crate::PixelSpacing;
 use crate::dots::Mask;
 use crate::fit::{Fit, FitOptions, Lag, PhantomPlace, Scale};
-use crate::label::LabelOptions;
+use crate::label::{Expect, LabelOptions};
 use crate::shots::Shots;
 
 /// How far the lag may still wander once it was found (s).
@@ -27,8 +27,11 @@ pub struct SpatialOptions {
     /// Where the image is on the probe, about: a drawing of the holder, an earlier calibration. Without it the images
     /// have to agree among themselves.
     pub nominal: Option<Pose<Probe, Image>>,
-    /// How far the nominal place may be off (m).
+    /// How far off the wires may be from where the first guess has them, nominal or agreed on (m).
     pub nominal_off_m: f64,
+    /// What is known of the side the image is seen from: all that tells a mirrored image from a right one. A nominal
+    /// place says more, and is used instead.
+    pub expect: Expect,
     /// How wires are given to dots.
     pub label: LabelOptions,
     /// How far a dot may be from where the fit predicts its wire (m).
@@ -64,6 +67,7 @@ impl SpatialOptions {
             place: place.into(),
             nominal: None,
             nominal_off_m: 6e-3,
+            expect: Expect::Anything,
             label: LabelOptions::default(),
             gate_m: 2.5e-3,
         }
