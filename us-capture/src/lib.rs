@@ -9,6 +9,7 @@ extern crate self as probepath_us_capture;
 mod bscan;
 mod calibration;
 mod capture;
+pub mod check;
 pub mod dots;
 pub mod errors;
 pub mod exam;
