@@ -272,7 +272,7 @@ fn a_drawn_sequence_gives_back_the_truth_it_was_drawn_from() {
     // A picture of every image, and the map of the error.
     assert_eq!(std::fs::read_dir(&pictures).unwrap().count(), 60 + 30 + 1);
     let kept = Calibration::read(stored.as_ref()).unwrap();
-    assert!(kept.error.held_out && kept.phantom == "fCAL 1.2", "{kept:?}");
+    assert!(kept.error.held_out && kept.phantom == "fcal-1.2", "{kept:?}");
     assert!(kept.probe_from_image.distance(&drawn.probe_from_image).0 < 1.5e-4);
     std::fs::remove_dir_all(out).unwrap();
 }

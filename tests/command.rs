@@ -62,6 +62,34 @@ fn nothing_is_converted_between_things_of_different_kinds() {
     assert!(String::from_utf8_lossy(&failed.stderr).contains("no way from a.stl to b.nrrd"));
 }
 
+#[test]
+fn a_wish_of_a_calibration_that_cannot_be_is_wrong_usage() {
+    let wrong = [
+        ("--region", "1,2,3", "27,27,766,562"),
+        ("--pixel-mm", "0.000078", "0.078"),
+        ("--phantom-to-reference", "1,2", "x,y,z"),
+        ("--place", "somewhere", "unknown"),
+        ("--scale", "big", "estimated"),
+        ("--fan", "1,2,3,4,5", "six numbers"),
+        ("--orientation", "XX", "MF"),
+    ];
+    for (option, value, said) in wrong {
+        let asked = ["calibrate", "spatial", "x.igs.mha", "--phantom", "fcal-1.2", option, value];
+        let out = probepath(&asked);
+        let text = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(out.status.code() == Some(2) && text.contains(said), "{option}: {text}");
+    }
+    assert_eq!(probepath(&["calibrate", "spatial", "x.igs.mha"]).status.code(), Some(2));
+}
+
+#[test]
+fn a_calibration_that_fails_says_so_in_one_document() {
+    let out = probepath(&["calibrate", "spatial", "no-such.igs.mha", "--phantom", "fcal-1.2", "--json"]);
+    assert_eq!(out.status.code(), Some(1));
+    let document: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert!(document["error"].as_str().unwrap().contains("no-such.igs.mha"), "{document}");
+}
+
 #[cfg(unix)]
 #[test]
 fn ctrl_c_in_the_middle_of_a_scan_leaves_the_arm_at_rest_and_the_exam_readable() {

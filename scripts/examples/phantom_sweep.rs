@@ -12,7 +12,7 @@ use std::error::Error;
 use std::f64::consts::TAU;
 
 use nalgebra::{Isometry3, Matrix4, Translation3, UnitQuaternion, Vector3};
-use probepath_frames::{Image, Phantom, Pose, Probe, Stamp, World};
+use probepath_frames::{Image, Pose, Probe, Stamp, World};
 use probepath_sim::{Contact, ImagingConfig, Medium, Renderer, Strand, Tissue, settings};
 use probepath_us_capture::Setting;
 use probepath_us_capture::phantom::WirePhantom;

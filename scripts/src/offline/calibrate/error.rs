@@ -1,6 +1,6 @@
 //! Why a calibration was not made.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use probepath_us_capture::BadCalibration;
 use probepath_us_capture::dots::BadDots;
@@ -17,7 +17,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum CalibrateError {
     /// A sequence that cannot be read.
-    #[error("{}: {source}{}", path.display(), hint(source))]
+    #[error("{}{source}{}", named(path, source), hint(source))]
     Sequence {
         /// The file.
         path: PathBuf,
@@ -166,6 +166,14 @@ pub enum CalibrateError {
 
 fn list(there: &[String]) -> String {
     if there.is_empty() { "no transform at all".into() } else { there.join(", ") }
+}
+
+/// The file, unless the error names it itself.
+fn named(path: &Path, error: &SequenceError) -> String {
+    match error {
+        SequenceError::Disk { .. } => String::new(),
+        _ => format!("{}: ", path.display()),
+    }
 }
 
 /// What to type where a file does not say something.

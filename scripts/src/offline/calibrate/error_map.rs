@@ -10,11 +10,11 @@ const WIDTH: usize = 480;
 /// Rows below the map, for its words.
 const WORDS: usize = 34;
 const SAID: Colour = [235, 235, 235];
-/// A line is drawn wherever the error passes a multiple of this (mm).
-const LINE_MM: f64 = 0.05;
+/// So many lines of equal error, about.
+const LINES: f64 = 5.0;
 
 /// The map over an image of `size` pixels, in its true proportions: dark where the calibration is sure, yellow where it is
-/// least; a line every 0.05 mm, numbers at the corners and in the middle.
+/// least; lines of equal error, numbers at the corners and in the middle.
 pub(super) fn draw(map: &StandardErrorMap, size: (usize, usize), spacing: PixelSpacing) -> Picture {
     let proportion = (size.1 as f64 * spacing.y_m) / (size.0 as f64 * spacing.x_m);
     let height = ((WIDTH as f64 * proportion) as usize).clamp(60, 3 * WIDTH);
@@ -24,7 +24,8 @@ pub(super) fn draw(map: &StandardErrorMap, size: (usize, usize), spacing: PixelS
     let at = |column: usize, row: usize| {
         between(map, column as f64 / (WIDTH - 1) as f64, row as f64 / (height - 1) as f64)
     };
-    let band = |column: usize, row: usize| (at(column, row) * 1e3 / LINE_MM).floor();
+    let line_mm = round((most - least) * 1e3 / LINES);
+    let band = |column: usize, row: usize| (at(column, row) * 1e3 / line_mm).floor();
     for row in 0..height {
         for column in 0..WIDTH {
             let line = column > 0 && row > 0 && (band(column, row) - band(column - 1, row - 1)).abs() > 0.5;
@@ -35,7 +36,7 @@ pub(super) fn draw(map: &StandardErrorMap, size: (usize, usize), spacing: PixelS
     }
     numbers(&mut picture, height, &at);
     let words = format!(
-        "standard error of a point: {:.3} mm mean, {:.3} mm at the 95th percentile",
+        "a line every {line_mm} mm; standard error of a point: {:.3} mm mean, {:.3} mm at the 95th percentile",
         map.mean_m() * 1e3,
         map.p95_m() * 1e3
     );
@@ -51,6 +52,13 @@ fn numbers(picture: &mut Picture, height: usize, at: &impl Fn(usize, usize) -> f
         let left = (column as i64 - 36).clamp(4, WIDTH as i64 - 8 * text.len() as i64 - 4);
         picture.text((left, (row as i64 - 4).clamp(4, height as i64 - 12)), &text, SAID);
     }
+}
+
+/// 1, 2 or 5 times a power of ten, the first that is not smaller.
+fn round(step: f64) -> f64 {
+    let step = step.max(1e-4);
+    let power = 10f64.powf(step.log10().floor());
+    [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().find(|s| *s >= step * 0.999).unwrap_or(10.0 * power)
 }
 
 /// Between the map's points; `across` and `down` run from 0 to 1.
