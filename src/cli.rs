@@ -4,7 +4,7 @@ mod calibrate;
 
 use std::path::PathBuf;
 
-pub use calibrate::{Calibrate, Spatial, Subject, Temporal};
+pub use calibrate::{Calibrate, Check, Spatial, Subject, Temporal};
 use clap::{Args, Parser, Subcommand};
 
 /// An ultrasound probe on a robot arm: taught by hand, replayed at constant force, reconstructed in 3D.

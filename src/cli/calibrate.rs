@@ -13,6 +13,8 @@ pub enum Calibrate {
     Spatial(Box<Spatial>),
     /// How late the images are against the poses, from a plane that moves in the image.
     Temporal(Temporal),
+    /// Whether a stored calibration still holds: pass or fail, by how much.
+    Check(Box<Check>),
 }
 
 /// The phantom, and how the images of a sequence are to be read.
@@ -99,4 +101,21 @@ pub struct Temporal {
     /// Orientation of files that do not say theirs.
     #[arg(long, value_name = "MF|UF|MN|UN")]
     pub orientation: Option<Stored>,
+}
+
+/// `calibrate check`
+#[derive(Args, Debug)]
+pub struct Check {
+    /// The stored calibration (.toml).
+    pub calibration: PathBuf,
+    /// A short scan of the phantom: 20 seconds are enough.
+    pub sequence: PathBuf,
+    #[command(flatten)]
+    pub subject: Subject,
+    /// Where the phantom is in the reference system (mm): a translation x,y,z, or 16 numbers row by row.
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub phantom_to_reference: Option<PhantomToReference>,
+    /// Temperature of the water the phantom stands in. Otherwise the size of the rows is found from the dots.
+    #[arg(long, value_name = "T")]
+    pub water_celsius: Option<f64>,
 }

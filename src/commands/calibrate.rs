@@ -1,9 +1,11 @@
 //! `calibrate …`: what was typed, brought to the room that does it.
 
-use probepath_scripts::offline::calibrate::{self, SpatialRequest, SubjectRequest, TemporalRequest};
+use probepath_scripts::offline::calibrate::{
+    self, CheckRequest, SpatialRequest, SubjectRequest, TemporalRequest,
+};
 
 use super::Outcome;
-use crate::cli::{Calibrate, Spatial, Subject, Temporal};
+use crate::cli::{Calibrate, Check, Spatial, Subject, Temporal};
 use crate::screen::{Document, Screen};
 
 /// Does what was typed.
@@ -14,6 +16,7 @@ pub fn perform(which: Calibrate, screen: &Screen) -> Outcome {
     match which {
         Calibrate::Spatial(args) => spatial(*args, screen),
         Calibrate::Temporal(args) => temporal(args, screen),
+        Calibrate::Check(args) => check(*args, screen),
     }
 }
 
@@ -45,6 +48,17 @@ fn temporal(args: Temporal, screen: &Screen) -> Outcome {
         orientation: args.orientation,
     };
     Ok(Document::of(&calibrate::temporal(&request, &*screen.progress())?)?)
+}
+
+fn check(args: Check, screen: &Screen) -> Outcome {
+    let request = CheckRequest {
+        calibration: args.calibration,
+        sequence: args.sequence,
+        subject: subject(args.subject),
+        phantom_to_reference: args.phantom_to_reference,
+        water_celsius: args.water_celsius,
+    };
+    Ok(Document::of(&calibrate::check(&request, &*screen.progress())?)?)
 }
 
 fn subject(args: Subject) -> SubjectRequest {

@@ -3,6 +3,7 @@
 //! Nothing is decided here: the method is `us-capture`'s, the words and pictures are ours.
 
 mod alone;
+mod check;
 mod document;
 mod error;
 mod error_map;
@@ -19,9 +20,10 @@ mod temporal;
 mod text;
 mod wishes;
 
+pub use check::{Checked, check};
 pub use document::{Covariance, Depth, ImageDots, OverImage, PlusMatrices, RefusedImage, Section, Spatial};
 pub use error::CalibrateError;
-pub use request::{SpatialRequest, SubjectRequest, TemporalRequest};
+pub use request::{CheckRequest, SpatialRequest, SubjectRequest, TemporalRequest};
 pub use spatial::spatial;
 pub use temporal::{Temporal, temporal};
 pub use wishes::{Fan, PhantomToReference, PixelMm, Place, Region, Scale, Stored};

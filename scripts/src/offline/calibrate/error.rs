@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use probepath_us_capture::BadCalibration;
+use probepath_us_capture::check::CheckError;
 use probepath_us_capture::dots::BadDots;
 use probepath_us_capture::lag::TemporalError;
 use probepath_us_capture::phantom::BadPhantom;
@@ -61,6 +62,27 @@ pub enum CalibrateError {
         path: PathBuf,
         /// Why.
         source: SpatialError,
+    },
+    /// The image lies in the probe as a mirrored one would.
+    #[error(
+        "the image is mirrored against what is known of the probe: its {axis} axis points the other way ({angle_deg:.0} degrees \
+         off), and so does its normal; correct the images' orientation ({hint}), or what is known"
+    )]
+    Mirrored {
+        /// Which axis.
+        axis: &'static str,
+        /// How far off it is (degrees).
+        angle_deg: f64,
+        /// What the orientation probably is.
+        hint: &'static str,
+    },
+    /// A check that could not be made.
+    #[error("{}: {source}", path.display())]
+    Check {
+        /// The scan.
+        path: PathBuf,
+        /// Why.
+        source: CheckError,
     },
     /// A region or a fan that is none.
     #[error(transparent)]

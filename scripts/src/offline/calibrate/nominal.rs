@@ -7,7 +7,6 @@ use std::path::Path;
 use probepath_frames::{Image, Pose, Probe};
 use probepath_us_capture::Calibration;
 use probepath_us_capture::plus::PlusConfig;
-use probepath_us_capture::spatial::SpatialError;
 
 use super::CalibrateError;
 
@@ -34,19 +33,19 @@ pub(super) fn read(path: &Path) -> Result<Pose<Probe, Image>, CalibrateError> {
 ///
 /// # Errors
 /// When it does, with the orientation that would be right.
-pub(super) fn check(nominal: &Pose<Probe, Image>, found: &Pose<Probe, Image>) -> Result<(), SpatialError> {
+pub(super) fn check(nominal: &Pose<Probe, Image>, found: &Pose<Probe, Image>) -> Result<(), CalibrateError> {
     let turn = nominal.isometry().rotation.inverse() * found.isometry().rotation;
     let axes = turn.to_rotation_matrix();
     let off = |k: usize| axes[(k, k)].clamp(-1.0, 1.0).acos().to_degrees();
     let kept = |k: usize| off(k) < SURE_DEG;
     let reversed = |k: usize| off(k) > 180.0 - SURE_DEG;
     match (0, 1) {
-        (x, y) if reversed(x) && kept(y) && reversed(2) => Err(SpatialError::Mirrored {
+        (x, y) if reversed(x) && kept(y) && reversed(2) => Err(CalibrateError::Mirrored {
             axis: "column",
             angle_deg: off(x),
             hint: "UF instead of MF, or MF instead of UF",
         }),
-        (x, y) if kept(x) && reversed(y) && reversed(2) => Err(SpatialError::Mirrored {
+        (x, y) if kept(x) && reversed(y) && reversed(2) => Err(CalibrateError::Mirrored {
             axis: "row",
             angle_deg: off(y),
             hint: "MN instead of MF, or MF instead of MN",

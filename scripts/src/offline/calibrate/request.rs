@@ -64,3 +64,18 @@ pub struct TemporalRequest {
     /// For files that do not say theirs.
     pub orientation: Option<Stored>,
 }
+
+/// `calibrate check`.
+#[derive(Clone, Debug, Default)]
+pub struct CheckRequest {
+    /// The stored calibration.
+    pub calibration: PathBuf,
+    /// A short scan of the phantom.
+    pub sequence: PathBuf,
+    /// The phantom, and how the images are read.
+    pub subject: SubjectRequest,
+    /// Where the phantom is.
+    pub phantom_to_reference: Option<PhantomToReference>,
+    /// Temperature of the water it stands in (Celsius), where somebody measured it.
+    pub water_celsius: Option<f64>,
+}

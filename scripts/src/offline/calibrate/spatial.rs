@@ -37,8 +37,7 @@ pub fn spatial(request: &SpatialRequest, progress: &dyn Progress) -> Result<Spat
     };
     let nominal = request.nominal.as_deref().map(nominal::read).transpose()?;
     if let Some(nominal) = nominal.or(subject.probe_from_image) {
-        nominal::check(&nominal, &found.fit.probe_from_image)
-            .map_err(|source| CalibrateError::Spatial { path: request.sequence.clone(), source })?;
+        nominal::check(&nominal, &found.fit.probe_from_image)?;
     }
     let mut document = document(request, &subject, &recording, &found);
     let mut errors = (found.evaluation.found.clone(), false);
@@ -63,7 +62,7 @@ pub fn spatial(request: &SpatialRequest, progress: &dyn Progress) -> Result<Spat
 }
 
 /// What the calibration's own progress is to the listener.
-fn watching<'a>(
+pub(super) fn watching<'a>(
     progress: &'a dyn Progress,
     step: &'a str,
     from: f64,
