@@ -10,7 +10,6 @@ use std::sync::Arc;
 use calibration_truth::{Capture, Dice, Truth, captured, zs};
 use probepath_frames::{Pose, Span};
 use probepath_us_capture::fit::{PhantomPlace, Sighting};
-use probepath_us_capture::sequence::SkipReason;
 use probepath_us_capture::shots::{Shot, Shots};
 use probepath_us_capture::spatial::{Spatial, SpatialError, SpatialOptions};
 
@@ -148,11 +147,9 @@ fn what_cannot_be_calibrated_is_refused_with_the_reason() {
     let good = shots(&mut dice, &truth, 0);
     let options = options(&mut dice, &truth);
     let calibrate = |shots: &Shots| Spatial::calibrate(shots, &truth.phantom, &options, &|_| {}).unwrap_err();
-    let with = |pixels: &dyn Fn(&Shot) -> Result<Arc<[u8]>, SkipReason>| {
-        let shots = good.shots().iter().map(|s| Shot { pixels: pixels(s), ..s.clone() }).collect();
-        Shots::new(SIZE, shots, truth.track.clone()).unwrap()
-    };
-    let black = with(&|_| Ok(vec![0_u8; SIZE.0 * SIZE.1].into()));
+    let nothing: Arc<[u8]> = vec![0_u8; SIZE.0 * SIZE.1].into();
+    let dark = good.shots().iter().map(|s| Shot { pixels: Ok(nothing.clone()), ..s.clone() }).collect();
+    let black = Shots::new(SIZE, dark, truth.track.clone()).unwrap();
     let SpatialError::TooFewImages { labelled: 0, refused, .. } = calibrate(&black) else {
         unreachable!("black images show no wire")
     };

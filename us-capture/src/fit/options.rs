@@ -129,7 +129,7 @@ impl PhantomPlace {
 }
 
 impl FitOptions {
-    /// Both sides of the pixel and a lag between -1 and 1 s to be found; a floor of 0.1 mm; outliers by Cauchy.
+    /// Both sides of the pixel and a lag between -1 and 1 s to be found; a floor of 0.3 mm; outliers by Cauchy.
     pub const fn new(spacing: PixelSpacing, place: PhantomPlace) -> Self {
         let (from, to) = (Span::from_milliseconds(-1000), Span::from_milliseconds(1000));
         Self {
@@ -137,8 +137,8 @@ impl FitOptions {
             scale: Scale::Estimated,
             lag: Lag::Estimated { from, to },
             place,
-            floor_m: 1e-4,
-            robust: Robust::Cauchy(3.0),
+            floor_m: 3e-4,
+            robust: Robust::Cauchy(5.0),
         }
     }
 
