@@ -100,7 +100,9 @@ impl Goal {
         let mean = values.iter().sum::<f64>() / counted.max(1) as f64;
         let spread = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
         let sd = (spread / counted.saturating_sub(1).max(1) as f64).sqrt();
-        let worst = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        // What is no number is worse than any, so that it cannot hide.
+        let worse = |a: f64, b: f64| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) };
+        let worst = values.iter().copied().fold(f64::NEG_INFINITY, worse);
         Self {
             figure: figure.into(),
             mean,
@@ -153,6 +155,11 @@ mod tests {
         let goals = Goals::new("x", 3, vec![Goal::of("error", &[0.1, 0.2, 0.5], Some(0.4), None)]);
         assert!(!goals.reached);
         assert!(goals.to_string().contains("MISSED"));
+    }
+
+    #[test]
+    fn what_is_no_number_keeps_no_bound() {
+        assert_eq!(Goal::of("error", &[0.1, f64::NAN, 0.2], Some(0.4), None).kept, Some(false));
     }
 
     #[test]

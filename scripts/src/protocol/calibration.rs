@@ -69,7 +69,7 @@ fn visits(engine: &mut Engine, stage: &Stage) {
 fn calibrations(engine: &mut Engine, stage: &Stage) {
     engine.register_type_with_name::<Arc<Calibrated>>("Calibration");
     engine.register_get("standard_error", |calibrated: &mut Arc<Calibrated>| {
-        Length::from_si(calibrated.standard_error_m().0)
+        Length::from_si(calibrated.standard_error().mean_m)
     });
     engine.register_get("mid_rms", |calibrated: &mut Arc<Calibrated>| {
         Length::from_si(calibrated.found().mid_rms_mm * 1e-3)

@@ -3,9 +3,12 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use probepath_frames::{Image, Pose, Probe, Span};
 use probepath_us_capture::exam::Attachment;
-use probepath_us_capture::fit::{Lag, PhantomPlace, Scale, speed_of_sound_in_water};
-use probepath_us_capture::spatial::{Doing, Evaluation, Spatial, SpatialOptions};
-use probepath_us_capture::{Calibration, CalibrationError, FoundMm, PixelSpacing, Quality, Setting, Water};
+use probepath_us_capture::fit::{Lag, Parameter, PhantomPlace, Scale, speed_of_sound_in_water};
+use probepath_us_capture::plan::Expected;
+use probepath_us_capture::spatial::{Doing, Evaluation, Spatial, SpatialError, SpatialOptions};
+use probepath_us_capture::{
+    Calibration, CalibrationError, FoundMm, PixelSpacing, PromisedMm, Quality, Setting, Water,
+};
 use serde::Serialize;
 
 use super::{PhantomImages, Session, SessionError};
@@ -35,8 +38,23 @@ pub struct Calibrated {
     pub size: (usize, usize),
     /// How warm the water was (degrees Celsius).
     pub water_celsius: f64,
+    /// What the arm's own error does, were every dot exact.
+    pub arm: Option<Expected>,
     /// What has been found on images that it has not used.
     pub held: Option<Evaluation>,
+}
+
+/// How sure a calibration is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct StandardError {
+    /// Of a reconstructed point in the probe, mean over the image (m).
+    pub mean_m: f64,
+    /// Its 95th percentile over the image (m).
+    pub p95_m: f64,
+    /// Its root mean square over the image (m).
+    pub rms_m: f64,
+    /// Of the lag (s), from the scatter of the dots.
+    pub lag_s: f64,
 }
 
 /// How good a calibration is: on images that it has not used (lengths in mm).
@@ -85,17 +103,19 @@ impl std::fmt::Display for Checked {
 }
 
 impl Calibrated {
-    /// Standard error of a reconstructed point over the image, as the fit says it: mean and 95th percentile (m).
-    pub fn standard_error_m(&self) -> (f64, f64) {
+    /// Standard error of a reconstructed point over the image: what the fit says from the scatter of the dots, and what
+    /// the arm's accuracy does, which images at one place share.
+    pub fn standard_error(&self) -> StandardError {
         let map = self.spatial.fit.uncertainty.standard_error_map(self.size.0, self.size.1);
-        (map.mean_m(), map.p95_m())
-    }
-
-    /// The same, root mean square over the image (m).
-    pub fn standard_error_rms_m(&self) -> f64 {
-        let map = self.spatial.fit.uncertainty.standard_error_map(self.size.0, self.size.1);
-        let squares = map.errors_m.iter().map(|error| error * error);
-        (squares.sum::<f64>() / map.errors_m.len().max(1) as f64).sqrt()
+        let squares: f64 = map.errors_m.iter().map(|error| error * error).sum();
+        let rms_m = (squares / map.errors_m.len().max(1) as f64).sqrt();
+        let arm = |pick: fn(&Expected) -> f64| self.arm.as_ref().map_or(0.0, pick);
+        StandardError {
+            mean_m: map.mean_m().hypot(arm(|e| e.point_mean_m)),
+            p95_m: map.p95_m().hypot(arm(|e| e.point_p95_m)),
+            rms_m: rms_m.hypot(arm(|e| e.point_rms_m)),
+            lag_s: self.spatial.fit.uncertainty.standard_error_of(Parameter::LAG).unwrap_or_default(),
+        }
     }
 
     /// Where the image's plane is for scanning tissue, with the machine's own spacing. In water sound is slower than
@@ -115,6 +135,7 @@ impl Calibrated {
     }
 
     fn quality(&self) -> Quality {
+        let error = self.standard_error();
         let found = &self.held.as_ref().unwrap_or(&self.spatial.evaluation).found;
         Quality {
             found: FoundMm::of(found, self.held.is_some()),
@@ -123,6 +144,7 @@ impl Calibrated {
                 speed_of_sound_m_s: speed_of_sound_in_water(self.water_celsius),
                 assumed_m_s: ASSUMED_M_S,
             }),
+            standard_error: PromisedMm { mean_mm: error.mean_m * 1e3, p95_mm: error.p95_m * 1e3 },
             ..Quality::of(&self.spatial.fit, self.size)
         }
     }
@@ -166,22 +188,39 @@ impl Session {
             Doing::Looking { done, of } => progress.at("looking for wires", done as f64 / of.max(1) as f64),
             Doing::Fitting { .. } => progress.at("calibrating", 1.0),
         };
-        let spatial = Spatial::calibrate(&images.shots, &images.located.phantom, &options, &watch)?;
+        let phantom = &images.located.phantom;
+        let mut spatial = Spatial::calibrate(&images.shots, phantom, &options, &watch);
+        if spatial.as_ref().map_or(true, is_doubtful) {
+            // The drawing may have led to the wrong wires: once more without it, from what the images agree on.
+            let alone = SpatialOptions { nominal: None, ..options };
+            let again = Spatial::calibrate(&images.shots, phantom, &alone, &watch);
+            spatial = better(spatial, again);
+        }
+        let spatial = spatial?;
+        if is_doubtful(&spatial) {
+            self.warn(&format!(
+                "The calibration's own Z-fiducials are {:.1} mm off: wires may have been taken for others. Bring the \
+                 nominal calibration or the phantom's place nearer to the truth, and calibrate again.",
+                spatial.evaluation.mid.rms_m * 1e3
+            ));
+        }
+        let arm = images.visits.error_of_the_arm(&spatial, images.setting, images.shots.size());
         let calibrated = Calibrated {
             spatial,
             setting: images.setting,
             size: images.shots.size(),
             water_celsius: wish.water_celsius.unwrap_or(images.located.water_celsius),
+            arm,
             held: None,
         };
-        let ((mean, p95), evaluation) = (calibrated.standard_error_m(), &calibrated.spatial.evaluation);
+        let (error, evaluation) = (calibrated.standard_error(), &calibrated.spatial.evaluation);
         self.say(&format!(
             "Calibrated from {} of {} images: standard error {:.3} mm over the image, {:.3} mm at its 95th \
              percentile; lag {:.1} ms.",
             evaluation.labelled,
             evaluation.images,
-            mean * 1e3,
-            p95 * 1e3,
+            error.mean_m * 1e3,
+            error.p95_m * 1e3,
             calibrated.spatial.fit.lag.seconds() * 1e3
         ));
         for weak in &calibrated.spatial.fit.weak {
@@ -238,6 +277,26 @@ impl Session {
         }
         self.say(&format!("The calibration is in {}.", path.display()));
         Ok(())
+    }
+}
+
+/// Z-fiducials this far off on the very images of the fit (m) say that wires were taken for others.
+const DOUBTFUL_M: f64 = 0.5e-3;
+
+fn is_doubtful(spatial: &Spatial) -> bool {
+    // Written so that NaN is doubtful as well.
+    !(spatial.evaluation.mid.rms_m <= DOUBTFUL_M)
+}
+
+/// The one whose own Z-fiducials are less far off.
+fn better(
+    one: Result<Spatial, SpatialError>,
+    other: Result<Spatial, SpatialError>,
+) -> Result<Spatial, SpatialError> {
+    match (one, other) {
+        (Ok(one), Ok(other)) if other.evaluation.mid.rms_m < one.evaluation.mid.rms_m => Ok(other),
+        (Err(_), Ok(other)) => Ok(other),
+        (one, _) => one,
     }
 }
 

@@ -3,9 +3,10 @@
 use probepath_frames::{Direction, Phantom, Point, Pose, Probe, Span, Track, World};
 use probepath_robot::{GuardLimits, Joints, Plane, Workspace};
 use probepath_teach_replay::{PlanSettings, Round, RoundPhase, RoundStatus, Stop};
-use probepath_us_capture::plan::{Bench, VisitOptions, VisitPlan};
+use probepath_us_capture::plan::{Bench, Expected, VisitOptions, VisitPlan, expected};
 use probepath_us_capture::shots::{Shot, Shots};
-use probepath_us_capture::{Capture, Counts, Keeping, PlacedBScan};
+use probepath_us_capture::spatial::Spatial;
+use probepath_us_capture::{Capture, Counts, Keeping, PlacedBScan, Setting};
 
 use super::locate::Located;
 use super::recorder::{Eye, Recorder, Stand, Taped};
@@ -23,6 +24,9 @@ const FORCE_HARD_N: f64 = 6.0;
 const WIDEST_GAP: Span = Span::from_milliseconds(20);
 /// B-scans come this much later than the machine says, at the latest.
 const LATE: Span = Span::from_milliseconds(100);
+
+/// A dot that is off by no more than this is exact (m).
+const EXACT_M: f64 = 1e-6;
 
 /// How a phantom is to be visited.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,7 +51,7 @@ pub struct Visits {
     located: Located,
     at_rest: Vec<Pose<World, Probe>>,
     sweeps: Vec<probepath_us_capture::plan::Sweep>,
-    clearance_m: f64,
+    options: VisitOptions,
 }
 
 /// What is planned for a calibration.
@@ -69,7 +73,9 @@ pub struct PhantomImages {
     /// The B-scans and the probe's track.
     pub shots: Shots,
     /// How the machine was set.
-    pub setting: probepath_us_capture::Setting,
+    pub setting: Setting,
+    /// Where the probe rested, and how that was planned.
+    pub visits: Visits,
     /// What became of all that came.
     pub counts: Counts,
 }
@@ -136,7 +142,7 @@ impl Session {
             located: located.clone(),
             at_rest: at_rest.to_vec(),
             sweeps: sweeps.to_vec(),
-            clearance_m: options.clearance_m,
+            options,
         };
         Ok(CalibrationPlan {
             stops: visits(&plan.poses, &plan.sweeps),
@@ -153,7 +159,7 @@ impl Session {
         wish.check()?;
         self.begin_exam("CALIBRATION")?;
         let start = self.ask_where(STEP)?;
-        let settings = self.in_water(&visits.located, visits.clearance_m);
+        let settings = self.in_water(&visits.located, visits.options.clearance_m);
         let (arm, operator) = (self.cell.probe_arm(), self.opening.operator.clone());
         let stops = visits.stops(wish, &self.cell.facts.world_from_base.inverse());
         let round = Round::new(&stops, &arm, (&start, &start), &settings, operator)?;
@@ -182,7 +188,7 @@ impl Session {
             pixels: Ok(placed.bscan.pixels().into()),
         };
         let shots = Shots::new(size, images.iter().map(shot).collect(), track)?;
-        Ok(PhantomImages { located: visits.located.clone(), shots, setting, counts })
+        Ok(PhantomImages { located: visits.located.clone(), shots, setting, visits: visits.clone(), counts })
     }
 
     /// What planning may use in the water over a phantom: nothing lower than the clearance over its wires.
@@ -251,6 +257,26 @@ impl Session {
 }
 
 impl Visits {
+    /// What the arm's own error does to a calibration from these places, were every dot exact: standard error of a
+    /// reconstructed point over the image. The scatter of the dots does not tell it: images at one place share it.
+    pub(super) fn error_of_the_arm(
+        &self,
+        spatial: &Spatial,
+        setting: Setting,
+        size: (usize, usize),
+    ) -> Option<Expected> {
+        let exact = VisitOptions { dot_sd_m: [EXACT_M; 2], ..self.options };
+        let bench = Bench {
+            phantom: spatial.phantom(),
+            world_from_phantom: spatial.fit.world_from_phantom,
+            probe_from_image: spatial.fit.probe_from_image,
+            upright: *self.at_rest.first()?,
+            setting,
+            size,
+        };
+        Some(expected(&bench, &exact, &self.at_rest))
+    }
+
     /// The stops in the arm's base: every pose at rest, then every sweep from end to end and back.
     fn stops(&self, wish: &VisitWish, base_from_world: &Pose<probepath_frames::Base, World>) -> Vec<Stop> {
         let still = |pose: &Pose<World, Probe>| Stop {

@@ -58,6 +58,8 @@ const SEEDS_TO_JUDGE: u64 = 50;
 /// [P1]: ten images of six fiducials for each calibration.
 const IMAGES: usize = 10;
 const FIDUCIALS: usize = 6;
+/// In a window of 2 cm not every image shows six; fewer than these are not counted.
+const FEWEST: usize = 3;
 
 /// Calibrates with each setting, once for each seed: noise, the arm's error, the holes' and the phantom's place, the
 /// machine's unknown lateness all differ. `only` restricts it to one setting.
@@ -111,8 +113,8 @@ impl Figures {
         self.mean.push(truth.mean_mm);
         self.p95.push(truth.p95_mm);
         self.lag.push(truth.lag_ms.abs());
-        self.stated.push(calibrated.standard_error_m().0 * 1e3);
-        self.squares.push((truth.rms_mm.powi(2), (calibrated.standard_error_rms_m() * 1e3).powi(2)));
+        self.stated.push(calibrated.standard_error().mean_m * 1e3);
+        self.squares.push((truth.rms_mm.powi(2), (calibrated.standard_error().rms_m * 1e3).powi(2)));
         Ok(())
     }
 
@@ -163,7 +165,8 @@ fn calibrate(session: &mut Session) -> Result<Calibrated, SessionError> {
     session.check_calibration(&calibrated, &others)
 }
 
-/// `sqrt( (1/MN) sum (dx² + dy²) )` (FIELD.md section 2, for [P1] eq. 5) of six wires in each of ten held-out images:
+/// `sqrt( (1/MN) sum (dx² + dy²) )` (FIELD.md section 2, for [P1] eq. 5) of six wires (or as many as a small window
+/// shows) in each of ten held-out images:
 /// how far each reconstructed dot is beside its wire. [P1] takes each fiducial's own mean for where it should be; here
 /// it is where the phantom's drawing has it, so that a calibration that is wrong by the same everywhere is wrong.
 fn c_rms_mm(calibrated: &Calibrated) -> f64 {
@@ -174,7 +177,7 @@ fn c_rms_mm(calibrated: &Calibrated) -> f64 {
         let errors = held.found.lines.iter().filter(|error| error.image == image);
         errors.map(|error| error.error_m * 1e3).collect()
     };
-    let full: Vec<Vec<f64>> = images.into_iter().map(of).filter(|dots| dots.len() >= FIDUCIALS).collect();
+    let full: Vec<Vec<f64>> = images.into_iter().map(of).filter(|dots| dots.len() >= FEWEST).collect();
     let chosen = evenly(&full, IMAGES).flat_map(|dots| evenly(dots, FIDUCIALS));
     let squares: Vec<f64> = chosen.map(|mm| mm * mm).collect();
     (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()

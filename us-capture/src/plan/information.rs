@@ -54,6 +54,8 @@ pub struct Expected {
     pub point_mean_m: f64,
     /// Its 95th percentile over the image (m).
     pub point_p95_m: f64,
+    /// Its root mean square over the image (m).
+    pub point_rms_m: f64,
     /// Standard error of the lag (s); what was known before when nothing moves.
     pub lag_s: f64,
     /// Standard error of every unknown, by name.
@@ -85,6 +87,7 @@ impl Expected {
         Self {
             point_mean_m: errors.iter().sum::<f64>() / errors.len().max(1) as f64,
             point_p95_m: p95.unwrap_or(f64::INFINITY),
+            point_rms_m: (errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64).sqrt(),
             lag_s: covariance[(LAG, LAG)].sqrt(),
             parameters: named
                 .map(|(_, ((name, unit, per_si), variance))| ExpectedParameter {
