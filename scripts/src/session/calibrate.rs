@@ -4,6 +4,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use probepath_frames::{Image, Pose, Probe, Span};
 use probepath_us_capture::exam::Attachment;
 use probepath_us_capture::fit::{Lag, Parameter, PhantomPlace, Scale, speed_of_sound_in_water};
+use probepath_us_capture::label::Expect;
 use probepath_us_capture::plan::Expected;
 use probepath_us_capture::spatial::{Doing, Evaluation, Spatial, SpatialError, SpatialOptions};
 use probepath_us_capture::{
@@ -192,7 +193,8 @@ impl Session {
         let mut spatial = Spatial::calibrate(&images.shots, phantom, &options, &watch);
         if spatial.as_ref().map_or(true, is_doubtful) {
             // The drawing may have led to the wrong wires: once more without it, from what the images agree on.
-            let alone = SpatialOptions { nominal: None, ..options };
+            let side = options.nominal.map_or(options.expect, Expect::About);
+            let alone = SpatialOptions { nominal: None, expect: side, ..options };
             let again = Spatial::calibrate(&images.shots, phantom, &alone, &watch);
             spatial = better(spatial, again);
         }
