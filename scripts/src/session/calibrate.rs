@@ -286,8 +286,8 @@ impl Session {
 const DOUBTFUL_M: f64 = 0.5e-3;
 
 fn is_doubtful(spatial: &Spatial) -> bool {
-    // Written so that NaN is doubtful as well.
-    !(spatial.evaluation.mid.rms_m <= DOUBTFUL_M)
+    let rms_m = spatial.evaluation.mid.rms_m;
+    rms_m.is_nan() || rms_m > DOUBTFUL_M
 }
 
 /// The one whose own Z-fiducials are less far off.
