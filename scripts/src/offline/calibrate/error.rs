@@ -56,10 +56,12 @@ pub enum CalibrateError {
     #[error(transparent)]
     Temporal(#[from] TemporalError),
     /// No calibration came out.
-    #[error("{}: {source}", path.display())]
+    #[error("{}, taken for images of phantom {phantom}: {source}", path.display())]
     Spatial {
         /// The sequence.
         path: PathBuf,
+        /// The phantom that was named.
+        phantom: String,
         /// Why.
         source: SpatialError,
     },

@@ -32,7 +32,8 @@ pub fn spatial(request: &SpatialRequest, progress: &dyn Progress) -> Result<Spat
                 let seen = alone::seen(&recording.shots, &subject.phantom, &options)?;
                 pictures(request, &subject, &recording, "calibration", None, &seen)?;
             }
-            return Err(CalibrateError::Spatial { path: request.sequence.clone(), source });
+            let (path, phantom) = (request.sequence.clone(), subject.phantom.name.clone());
+            return Err(CalibrateError::Spatial { path, phantom, source });
         }
     };
     let nominal = request.nominal.as_deref().map(nominal::read).transpose()?;
@@ -43,9 +44,11 @@ pub fn spatial(request: &SpatialRequest, progress: &dyn Progress) -> Result<Spat
     let mut errors = (found.evaluation.found.clone(), false);
     if let (Some(other), Some(path)) = (&other, &request.validate) {
         let watch = watching(progress, "validating", 0.7, 0.9);
-        let held = found
-            .evaluate(&other.shots, &watch)
-            .map_err(|source| CalibrateError::Spatial { path: path.clone(), source })?;
+        let held = found.evaluate(&other.shots, &watch).map_err(|source| CalibrateError::Spatial {
+            path: path.clone(),
+            phantom: subject.phantom.name.clone(),
+            source,
+        })?;
         document.validation = Some(Section::of(path, &held.seen, &held.evaluation.found, request.dots));
         document.notes.extend(other.notes.iter().cloned());
         pictures(request, &subject, other, "validation", Some(&found.fit), &held.seen)?;
