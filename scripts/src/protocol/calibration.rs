@@ -13,7 +13,7 @@ use crate::session::{CalibrateWish, Calibrated, CalibrationPlan, Located, Phanto
 
 /// How each step is written, for messages.
 pub(super) const USAGE: &[(&str, &str)] = &[
-    ("locate_phantom", "locate_phantom()"),
+    ("locate_phantom", "locate_phantom() or locate_phantom(#{ touches: 10 })"),
     ("calibration_plan", "calibration_plan(phantom, #{ poses: 24, held_out: 12, tilt: degrees(18) })"),
     ("visit", "visit(plan.stops, #{ speed: mm_s(50), settle: seconds(0.3), look: seconds(0.12) })"),
     ("calibrate", "calibrate(images) or calibrate(images, #{ water: celsius(20) })"),
@@ -42,6 +42,20 @@ fn plans(engine: &mut Engine, stage: &Stage) {
     engine.register_fn("locate_phantom", move |context: NativeCallContext| -> Outcome<Arc<Located>> {
         s.step(&context, |session| session.phantom_as_measured()).map(Arc::new)
     });
+    let s = stage.clone();
+    engine.register_fn(
+        "locate_phantom",
+        move |context: NativeCallContext, map: Map| -> Outcome<Arc<Located>> {
+            let mut options = Options::new("locate_phantom", map);
+            let touches = options.count("touches").map_err(|e| wrong(&context, e))?;
+            options.done().map_err(|e| wrong(&context, e))?;
+            s.step(&context, |session| match touches {
+                Some(postures) => session.phantom_by_touch(postures),
+                None => session.phantom_as_measured(),
+            })
+            .map(Arc::new)
+        },
+    );
     let s = stage.clone();
     engine.register_fn(
         "calibration_plan",

@@ -8,6 +8,7 @@ use probepath_sim::CellError;
 use probepath_teach_replay::{GuideError, PathError, PlanError, ReplayError};
 use probepath_us_capture::exam::ExamError;
 use probepath_us_capture::plan::NoPlan;
+use probepath_us_capture::pointer::PointerError;
 use probepath_us_capture::shots::BadShots;
 use probepath_us_capture::spatial::SpatialError;
 use probepath_us_capture::{BadCalibration, CaptureError};
@@ -101,6 +102,9 @@ pub enum SessionError {
         "the cell has no wire phantom: name one under [simulated.subject.wire_phantom] in the cell's file"
     )]
     NoPhantom,
+    /// The landmarks that were touched say no place.
+    #[error("the phantom's landmarks: {0}")]
+    Pointer(#[from] PointerError),
     /// No plan for a calibration.
     #[error("nothing was moved: {0}")]
     NoPlan(#[from] NoPlan),

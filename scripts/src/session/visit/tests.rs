@@ -59,3 +59,21 @@ fn a_cell_without_a_phantom_says_so_and_a_visit_too_fast_is_refused() {
     assert!(fast.check().unwrap_err().to_string().contains("between 1 and 50 mm/s"));
     std::fs::remove_dir_all(&session.opening.out).unwrap();
 }
+
+#[test]
+fn landmarks_touched_find_the_phantom_better_than_a_tape_measure() {
+    let mut session = session(CellFile::wire_phantom(), "touches");
+    let measured = session.phantom_as_measured().unwrap();
+    let touched = session.phantom_by_touch(10).unwrap();
+    let truth = session.cell.simulated.truth().world_from_phantom().unwrap();
+    let off = |located: &Located| {
+        let wires = located.phantom.wires.iter();
+        let away =
+            wires.map(|wire| (located.world_from_phantom * wire.front).distance(&(truth * wire.front)));
+        away.fold(0.0, f64::max)
+    };
+    assert!(off(&measured) > 1.5e-3, "{}", off(&measured));
+    assert!(off(&touched) < 4.0 * touched.sd_m, "{} m, said {} m", off(&touched), touched.sd_m);
+    assert!(touched.sd_m < 1e-3);
+    std::fs::remove_dir_all(&session.opening.out).unwrap();
+}
