@@ -318,10 +318,11 @@ impl VisitPlan {
         let prior = information::prior(options);
         let goal = information::over_the_image(bench);
         let mut chosen = choose::best(&mut candidates, &prior, &goal, options.poses, &reachable)?;
-        let checked = choose::best(&mut candidates, &prior, &goal, options.held_out, &reachable)?;
+        let mut checked = choose::best(&mut candidates, &prior, &goal, options.held_out, &reachable)?;
         let at_rest = choose::total(&prior, &chosen, &candidates);
         let (sweeps, moving) = sweeps::choose(&candidates, &at_rest, options, &reachable)?;
         choose::in_order(&mut chosen, &candidates);
+        choose::in_order(&mut checked, &candidates);
         Ok(Self {
             poses: chosen.iter().filter_map(|i| candidates.pose(*i)).collect(),
             held_out: checked.iter().filter_map(|i| candidates.pose(*i)).collect(),
