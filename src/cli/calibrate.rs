@@ -82,6 +82,10 @@ pub struct Spatial {
     /// mirrored image is told from one that is seen from behind.
     #[arg(long, value_name = "FILE")]
     pub nominal: Option<PathBuf>,
+    /// Of every N of a PLUS configuration the wire that is listed first is expected on the right of an MF image, as PLUS
+    /// has it, and images that show it on the left are refused as mirrored. This takes either.
+    #[arg(long)]
+    pub any_side: bool,
     /// The lag (s), where it is known: an image stamped t belongs to the pose at t + lag. Estimated otherwise.
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub lag_s: Option<f64>,

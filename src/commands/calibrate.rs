@@ -34,6 +34,7 @@ fn spatial(args: Spatial, screen: &Screen) -> Outcome {
         scale: args.scale,
         water_celsius: args.water_celsius,
         nominal: args.nominal,
+        any_side: args.any_side,
         lag_s: args.lag_s,
         date: today(),
     };

@@ -134,7 +134,8 @@ pub enum Refusal {
     },
     /// The image is mirrored, or lies on the probe the wrong way.
     #[error(
-        "{support} of {images} images agree, but as images that are {flipped}: give the sequence's true orientation"
+        "{support} of {images} images agree, but as images that are {flipped}: give the sequence's true \
+         orientation; or, where the probe did look at the phantom from the other side, say so (--any-side)"
     )]
     Mirrored {
         /// How.

@@ -10,8 +10,8 @@ const SMALLEST_M: f64 = 30e-6;
 const LARGEST_M: f64 = 400e-6;
 /// From one size to the next that is tried: within what the labeller bridges by itself.
 const STEP: f64 = 1.05;
-/// Images that are tried: those with the most dots.
-const IMAGES: usize = 5;
+/// Images that are tried: those with as many dots as the phantom has wires, or nearly.
+const IMAGES: usize = 8;
 
 /// The pixel size of images of a phantom, from their dots alone; both axes by themselves.
 ///
@@ -19,7 +19,7 @@ const IMAGES: usize = 5;
 /// explains the most wires is returned.
 ///
 /// # Errors
-/// When no image is explained by any size from 0.03 to 0.4 mm, as the image with the most dots is refused.
+/// When no image is explained by any size from 0.03 to 0.4 mm, as the likeliest image is refused.
 pub fn find_spacing(
     phantom: &WirePhantom,
     images: &[Vec<Dot>],
@@ -27,9 +27,9 @@ pub fn find_spacing(
 ) -> Result<PixelSpacing, Refusal> {
     let labeller = Labeller::new(phantom, options);
     let mut tried: Vec<&Vec<Dot>> = images.iter().collect();
-    tried.sort_by_key(|dots| std::cmp::Reverse(dots.len()));
+    tried.sort_by_key(|dots| dots.len().abs_diff(phantom.wires.len()));
     tried.truncate(IMAGES);
-    let Some(most) = tried.first() else { return Err(Refusal::NoDots) };
+    let Some(likeliest) = tried.first() else { return Err(Refusal::NoDots) };
     let steps = ((LARGEST_M / SMALLEST_M).ln() / STEP.ln()).ceil() as i32;
     let sized = (0..=steps).map(|k| SMALLEST_M * STEP.powi(k)).map(|m| PixelSpacing { x_m: m, y_m: m });
     let judged = sized.map(|spacing| (spacing, explained(&labeller, &tried, spacing)));
@@ -38,7 +38,7 @@ pub fn find_spacing(
     match best {
         Some((spacing, found)) if !found.is_empty() => Ok(rescaled(spacing, &found)),
         _ => Err(labeller
-            .candidates(most, PixelSpacing { x_m: 1e-4, y_m: 1e-4 })
+            .candidates(likeliest, PixelSpacing { x_m: 1e-4, y_m: 1e-4 })
             .err()
             .unwrap_or(Refusal::NoDots)),
     }

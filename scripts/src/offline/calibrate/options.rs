@@ -3,6 +3,7 @@
 use probepath_frames::{Phantom, Pose, Span, World};
 use probepath_us_capture::dots::Mask;
 use probepath_us_capture::fit::{Lag, PhantomPlace, Scale as Scales};
+use probepath_us_capture::label::Expect;
 use probepath_us_capture::spatial::SpatialOptions;
 
 use super::CalibrateError;
@@ -28,6 +29,7 @@ pub(super) fn of(
     let mut options = SpatialOptions::new(place);
     options.spacing = request.pixel_mm.map(|pixel| pixel.spacing()).or(subject.spacing);
     options.scale = scale(request, options.spacing.is_some())?;
+    options.expect = if request.any_side { Expect::Anything } else { subject.expect };
     options.mask = mask(recording.region, &request.subject)?;
     if let Some(lag_s) = request.lag_s {
         options.lag = Lag::Known(Span::from_seconds(lag_s));

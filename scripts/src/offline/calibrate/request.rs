@@ -46,6 +46,8 @@ pub struct SpatialRequest {
     pub water_celsius: f64,
     /// Where the image is on the probe, about: an earlier calibration (.toml) or a PLUS configuration (.xml).
     pub nominal: Option<PathBuf>,
+    /// The probe may look at the phantom from either side: a mirrored image is not looked for.
+    pub any_side: bool,
     /// The lag (s), where it is known.
     pub lag_s: Option<f64>,
     /// Today (ISO 8601), for the stored calibration.

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use probepath_frames::{Image, Phantom, Pose, Probe, World};
 use probepath_us_capture::PixelSpacing;
+use probepath_us_capture::label::Expect;
 use probepath_us_capture::phantom::WirePhantom;
 use probepath_us_capture::plus::PlusConfig;
 use probepath_us_capture::sequence::{ChainNames, ReadOptions, Sequence, TransformName};
@@ -23,6 +24,8 @@ pub(super) struct Subject {
     pub world_from_phantom: Option<Pose<World, Phantom>>,
     /// Where the configuration has the image on the probe, from an earlier calibration.
     pub probe_from_image: Option<Pose<Probe, Image>>,
+    /// What tells a mirrored image from one that is seen from behind.
+    pub expect: Expect,
     /// About how large a pixel is.
     pub spacing: Option<PixelSpacing>,
     /// The configuration's clip rectangle.
@@ -109,11 +112,13 @@ fn of_name(name: &str) -> Result<Subject, CalibrateError> {
 fn of_file(path: &Path) -> Result<Subject, CalibrateError> {
     let bad = |source| CalibrateError::Phantom { path: path.into(), source };
     let phantom = WirePhantom::read(path).map_err(bad)?;
-    let subject = Subject::of(phantom);
+    let mut subject = Subject::of(phantom);
     let text = std::fs::read_to_string(path).unwrap_or_default();
     if !text.trim_start_matches('\u{feff}').trim_start().starts_with('<') {
         return Ok(subject);
     }
+    // PLUS lists the wires of an N from right to left as an MF image shows them, and can label nothing else.
+    subject.expect = Expect::FirstWireRight;
     // The phantom may be all that can be read of a configuration: what else it says is then asked for by hand.
     match PlusConfig::parse(&text) {
         Ok(config) => subject.configured(path, &config),
@@ -131,6 +136,7 @@ impl Subject {
             configured,
             world_from_phantom: None,
             probe_from_image: None,
+            expect: Expect::Anything,
             spacing: None,
             clip: None,
             notes: Vec::new(),
