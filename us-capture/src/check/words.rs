@@ -54,9 +54,9 @@ fn moved(change: &Change, options: &CheckOptions) -> Vec<String> {
     let mut said = Vec::new();
     if change.is_elsewhere(options) {
         let ways: Vec<String> = [shifted(change), turned(change)].into_iter().flatten().collect();
-        let ways = if ways.is_empty() { String::new() } else { format!("{}: ", ways.join(" and ")) };
+        let ways = if ways.is_empty() { String::new() } else { format!(": {}", ways.join(" and ")) };
         said.push(format!(
-            "the image moved on the probe: {ways}its worst point is {}; the holder or the marker slipped, or the \
+            "the image moved on the probe{ways}; its worst point is {}; the holder or the marker slipped, or the \
              phantom is not where it is said to stand",
             worst(change)
         ));

@@ -127,6 +127,9 @@ fn honesty(cases: u64, d: Disturbance) -> (f64, f64, f64) {
     (squares / count, worst, 1.0 - count / cases as f64)
 }
 
+/// With 400 recordings each (2400, 26 s) the normalised error variances are 1.15, 0.73, 1.33, 1.28, 1.17 and 1.30, the
+/// worst errors 7, 14, 12, 6, 8 and 13 ms, and 2385 are answered. A chi square of 100 is within 0.28 of its mean with
+/// 95 %, and the bounds leave room for that.
 #[test]
 fn the_stated_error_is_the_true_one() {
     let clean = Disturbance { line_px: 1.0, ..Disturbance::default() };
@@ -138,8 +141,8 @@ fn the_stated_error_is_the_true_one() {
         Disturbance { outliers: 0.1, ..clean },
         Disturbance { line_px: 3.0, line_memory: 0.6, jitter_s: 0.005, pose_m: 2e-4, outliers: 0.05 },
     ] {
-        let (variance, worst, refused) = honesty(400, d);
-        assert!((0.65..1.4).contains(&variance), "{d:?}: {variance}");
+        let (variance, worst, refused) = honesty(100, d);
+        assert!((0.5..1.6).contains(&variance), "{d:?}: {variance}");
         assert!(worst < 0.05 && refused < 0.05, "{d:?}: worst {worst} s, {refused} refused");
     }
 }

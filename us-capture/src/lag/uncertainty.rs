@@ -39,7 +39,7 @@ pub(super) fn standard_error(motion: &Motion, rows: &[Row], fine: &Fine) -> Opti
 }
 
 /// The variance of a sum of these values is their number times this.
-fn long_run_variance(values: &[f64]) -> f64 {
+pub(super) fn long_run_variance(values: &[f64]) -> f64 {
     let n = values.len() as f64;
     let product = |series: &[f64], k: usize| -> f64 {
         series.iter().zip(series.iter().skip(k)).map(|(a, b)| a * b).sum::<f64>() / n

@@ -1,5 +1,6 @@
 //! The straight line through echoes.
 
+use super::super::uncertainty::long_run_variance;
 use super::Line;
 use super::echoes::Echo;
 
@@ -98,15 +99,16 @@ pub(super) fn through(support: &Support) -> Option<Line> {
     let echoes = &support.0;
     let mut weights = vec![1.0; echoes.len()];
     let mut fitted = fit(echoes, &weights)?;
+    let mut limit = f64::INFINITY;
     for _ in 0..20 {
-        let limit = 4.685 * spread(echoes, &fitted).max(0.1);
+        limit = 4.685 * spread(echoes, &fitted).max(0.1);
         for (weight, echo) in weights.iter_mut().zip(echoes) {
             let off = fitted.off(echo) / limit;
             *weight = (1.0 - off * off).max(0.0).powi(2);
         }
         fitted = fit(echoes, &weights)?;
     }
-    Some(line(echoes, &weights, &fitted))
+    Some(line(echoes, limit, &fitted))
 }
 
 fn fit(echoes: &[Echo], weights: &[f64]) -> Option<Fitted> {
@@ -132,22 +134,27 @@ fn spread(echoes: &[Echo], fitted: &Fitted) -> f64 {
     1.4826 * off.get(off.len() / 2).copied().unwrap_or_default()
 }
 
-fn line(echoes: &[Echo], weights: &[f64], fitted: &Fitted) -> Line {
-    let kept: Vec<(f64, f64)> =
-        echoes.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(e, w)| (fitted.off(e), *w)).collect();
-    let power: f64 = kept.iter().map(|(off, w)| w * off * off).sum();
-    let neighbours: f64 = kept.windows(2).map(|p| p[0].0 * p[1].0 * (p[0].1 * p[1].1).sqrt()).sum();
-    let rho = (neighbours / power).clamp(0.0, 0.97);
-    // Speckle makes neighbouring columns err together: so many of them are worth one.
-    let together = if power > 0.0 { (1.0 + rho) / (1.0 - rho) } else { 1.0 };
-    let variance = power / fitted.mass.max(1.0) * together;
+/// The line with its errors: what its equations scatter by, over how steeply they stand (the sandwich of M-estimators,
+/// Huber 1967). Speckle and a rough plane make neighbouring columns err together, so the scatter is that of sums along
+/// the columns. Without the sandwich the stated variance is two thirds of the true one.
+fn line(echoes: &[Echo], limit: f64, fitted: &Fitted) -> Line {
+    let offs = echoes.iter().map(|e| fitted.off(e)).filter(|off| off.abs() < limit);
+    let parts: Vec<(f64, f64)> = offs.map(|off| (off, (off / limit).powi(2))).collect();
+    let pulls: Vec<f64> = parts.iter().map(|(off, square)| off * (1.0 - square).powi(2)).collect();
+    let steep: f64 = parts.iter().map(|(_, square)| (1.0 - square) * (1.0 - 5.0 * square)).sum();
+    let (n, together) = (pulls.len() as f64, long_run_variance(&pulls));
+    let alone = pulls.iter().map(|pull| pull * pull).sum::<f64>();
+    // The line leans to its echoes, and the more the fewer of them are independent.
+    let leaning = if alone > 0.0 { (2.0 * together / alone).clamp(0.0, 0.5) } else { 0.0 };
+    let row_sd_px = (n * together.max(0.0)).sqrt() / (steep.max(0.25 * n) * (1.0 - leaning));
+    let slope_sd = row_sd_px * (fitted.mass / fitted.spread).sqrt();
     Line {
         column_px: fitted.column,
         row_px: fitted.row,
         slope: fitted.slope,
-        row_sd_px: (variance / fitted.mass).sqrt().max(LEAST_SD_PX),
-        slope_sd: (variance / fitted.spread).sqrt().max(LEAST_SD_PX / fitted.spread.sqrt()),
-        columns: kept.len(),
+        row_sd_px: row_sd_px.max(LEAST_SD_PX),
+        slope_sd: slope_sd.max(LEAST_SD_PX / fitted.spread.sqrt()),
+        columns: parts.len(),
         contrast_grey: echoes.iter().map(|e| e.contrast).sum::<f64>() / echoes.len() as f64,
     }
 }

@@ -64,7 +64,7 @@ fn scene(rng: &mut ChaCha8Rng) -> Scene {
 
 #[test]
 fn the_line_is_found_to_its_stated_error() {
-    let (mut worst, mut squares, mut n): (f64, f64, f64) = (0.0, 0.0, 0.0);
+    let (mut worst, mut squares, mut slopes, mut n): (f64, f64, f64, f64) = (0.0, 0.0, 0.0, 0.0);
     for seed in 0..1000 {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let scene = scene(&mut rng);
@@ -77,14 +77,20 @@ fn the_line_is_found_to_its_stated_error() {
         };
         let truth = scene.row + scene.slope * (line.column_px - 160.0);
         let error = line.row_px - truth;
-        assert!(error.abs() < 2.0 && (line.slope - scene.slope).abs() < 0.06, "{seed} {scene:?} {line:?}");
+        // Echoes of a rough plane lie off it, and together: its line is that of the columns that were seen.
+        let slope_error = line.slope - scene.slope;
+        assert!(error.abs() < 5.0 * line.row_sd_px, "{seed} {scene:?} {line:?}");
+        assert!(slope_error.abs() < 5.0 * line.slope_sd, "{seed} {scene:?} {line:?}");
         worst = worst.max(error.abs());
         squares += (error / line.row_sd_px).powi(2);
+        slopes += (slope_error / line.slope_sd).powi(2);
         n += 1.0;
     }
     assert!(n > 970.0, "{n} of 1000 found");
-    eprintln!("{n} found, worst {worst:.3} px, normalised error variance {:.2}", squares / n);
-    assert!((0.3..2.5).contains(&(squares / n)), "{}", squares / n);
+    let (row, slope) = (squares / n, slopes / n);
+    eprintln!("{n} found, worst {worst:.3} px, normalised error variance {row:.2}, of the slope {slope:.2}");
+    assert!((0.8..1.3).contains(&row) && (0.8..1.4).contains(&slope), "{row} {slope}");
+    assert!(worst < 1.2, "{worst} px");
 }
 
 fn plain() -> Scene {
