@@ -131,6 +131,19 @@ pub struct Held {
     pub evaluation: Evaluation,
 }
 
+/// What is seen of every image where the nominal calibration predicts its wires, nothing fitted.
+pub(crate) fn predicted(
+    shots: &Shots,
+    phantom: &WirePhantom,
+    options: &SpatialOptions,
+    watch: &(dyn Fn(Doing) + Sync),
+) -> Result<Vec<Seen>, SpatialError> {
+    let dots = look::dots(shots, options, options.spacing, watch)?;
+    let labeller = Labeller::new(phantom, options.label);
+    let nominal = first::nominal(options).ok_or(SpatialError::NoAgreement(crate::label::Refusal::NoDots))?;
+    Ok(relabel::all(shots, &dots, &labeller, &nominal, options.gate_m))
+}
+
 /// The fit once more, from where the last one ended.
 fn refit(
     shots: &Shots,

@@ -2,21 +2,23 @@
 
 use probepath_frames::{Image, Pose, Probe, Span};
 
-use super::{Check, CheckError, CheckOptions, Scan, around, concluded, rows, same_phantom, too_little};
+use super::{
+    Check, CheckError, CheckOptions, Scan, around, assumed_m_s, concluded, rows, same_phantom, too_little,
+};
 use crate::Calibration;
-use crate::fit::{Fit, Lag, PhantomPlace};
+use crate::fit::{Fit, Lag, PhantomPlace, speed_of_sound_in_water};
 use crate::phantom::WirePhantom;
 use crate::shots::Shots;
-use crate::spatial::{Doing, Spatial, SpatialError, SpatialOptions, sightings};
+use crate::spatial::{Doing, Seen, Spatial, SpatialError, SpatialOptions, predicted, sightings};
 
-/// Labels made with a lag that is off by more than this are made again.
-const LAG_MATTERS_S: f64 = 0.02;
+/// Wires are looked for so far from where the stored calibration predicts them (m).
+const NEAR_M: f64 = 3e-3;
 /// A picture's sides may differ from the setting's by this (pixels, part): files round lengths.
 const SAME_SIDE: (f64, f64) = (2.0, 0.01);
 
 /// Compares a stored calibration with the images of a short scan of its phantom.
 ///
-/// Wires are looked for where the stored calibration predicts them; when it predicts too few, the scan is calibrated
+/// Wires are looked for where the stored calibration predicts them; when images are left out, the scan is calibrated
 /// from nothing, so that a holder that slipped by centimetres is found out too. Images without stamps tell no lag.
 ///
 /// # Errors
@@ -36,16 +38,16 @@ pub fn check_shots(
     same_size(calibration, shots.size())?;
     let looking = Looking { shots, calibration, phantom, place, options, watch };
     let images = shots.shots().len();
-    let spatial = match looking.labels() {
+    let seen = match looking.labels() {
         Err(why) if is_too_little(&why) => {
             return Ok(Check { labelled: 0, ..Check::nothing(&why.to_string(), images) });
         }
-        spatial => spatial?,
+        seen => seen?,
     };
-    let fitted = looking.fit(&spatial);
+    let fitted = looking.fit(&seen);
     let check = concluded(calibration, fitted, (shots.size(), images), options)?;
-    let evaluation = &spatial.evaluation;
-    Ok(Check { labelled: evaluation.labelled, refused: evaluation.refused.clone(), ..check })
+    let refused = seen.iter().filter_map(|s| s.labels.as_ref().err().map(|why| (s.number, why.clone())));
+    Ok(Check { labelled: labelled(&seen), refused: refused.collect(), ..check })
 }
 
 /// The pictures have to be those the calibration belongs to.
@@ -79,51 +81,63 @@ struct Looking<'a> {
 }
 
 impl Looking<'_> {
-    /// The labels: predicted, once more when the lag is another than predicted, from nothing when that fails.
-    fn labels(&self) -> Result<Spatial, SpatialError> {
-        let nominal = Some(self.calibration.probe_from_image);
-        let predicted = match self.calibrate(nominal, Lag::Known(self.calibration.image_lag)) {
-            Err(SpatialError::StoodStill { images, moved_mm, turned_deg }) => {
-                return Err(SpatialError::StoodStill { images, moved_mm, turned_deg });
+    /// The labels: where the stored calibration predicts them, once more where their own fit does; from nothing when
+    /// that leaves images out.
+    fn labels(&self) -> Result<Vec<Seen>, SpatialError> {
+        let (pose, lag) = (self.calibration.probe_from_image, self.calibration.image_lag);
+        let mut seen = self.predicted(pose, lag)?;
+        // A place of the phantom that the calibration had corrected predicts badly too.
+        if 20 * labelled(&seen) < 19 * seen.len() {
+            let anew = Spatial::calibrate(self.shots, self.phantom, &self.options_for(None), self.watch);
+            match anew {
+                Ok(anew) if labelled(&anew.seen) > labelled(&seen) => return Ok(anew.seen),
+                Err(why) if labelled(&seen) == 0 => return Err(why),
+                _ => {}
             }
-            Err(why) => {
-                // What the stored calibration lacks is the better word when nothing helps.
-                return self.calibrate(None, around(self.calibration, self.options)).map_err(|_| why);
+        }
+        if let Ok(fit) = self.fit(&seen) {
+            let again = self.predicted(fit.probe_from_image, fit.lag)?;
+            if labelled(&again) > labelled(&seen) {
+                seen = again;
             }
-            Ok(predicted) => predicted,
-        };
-        match self.fit(&predicted) {
-            Ok(fit) if late(self.calibration, &fit) => {
-                Ok(self.calibrate(Some(fit.probe_from_image), Lag::Known(fit.lag)).unwrap_or(predicted))
-            }
-            _ => Ok(predicted),
+        }
+        Ok(seen)
+    }
+
+    fn predicted(&self, pose: Pose<Probe, Image>, lag: Span) -> Result<Vec<Seen>, SpatialError> {
+        let lag = Lag::Known(if self.shots.stamped { lag } else { Span::ZERO });
+        let options = SpatialOptions { lag, ..self.options_for(Some(pose)) };
+        predicted(self.shots, self.phantom, &options, self.watch)
+    }
+
+    fn options_for(&self, nominal: Option<Pose<Probe, Image>>) -> SpatialOptions {
+        let mut spacing = self.calibration.setting.spacing;
+        if let (Some(celsius), Some(_)) = (self.options.water_celsius, nominal) {
+            spacing.y_m *= speed_of_sound_in_water(celsius) / assumed_m_s(self.calibration);
+        }
+        SpatialOptions {
+            mask: self.options.mask.clone(),
+            spacing: Some(spacing),
+            scale: rows(self.calibration, self.options.water_celsius),
+            lag: around(self.calibration, self.options),
+            nominal,
+            gate_m: NEAR_M,
+            ..SpatialOptions::new(self.place)
         }
     }
 
-    fn calibrate(&self, nominal: Option<Pose<Probe, Image>>, lag: Lag) -> Result<Spatial, SpatialError> {
-        let options = SpatialOptions {
-            mask: self.options.mask.clone(),
-            spacing: Some(self.calibration.setting.spacing),
-            scale: rows(self.calibration, self.options.water_celsius),
-            lag,
-            nominal,
-            ..SpatialOptions::new(self.place)
-        };
-        Spatial::calibrate(self.shots, self.phantom, &options, self.watch)
-    }
-
     /// What these labels say, the lag free where the images have stamps.
-    fn fit(&self, spatial: &Spatial) -> Result<Fit, CheckError> {
+    fn fit(&self, seen: &[Seen]) -> Result<Fit, CheckError> {
         let lag = match self.shots.stamped {
             true => around(self.calibration, self.options),
             false => Lag::Known(Span::ZERO),
         };
         let (calibration, phantom, place) = (self.calibration, self.phantom, self.place);
-        let (sightings, track) = (&sightings(self.shots, &spatial.seen), self.shots.track());
+        let (sightings, track) = (&sightings(self.shots, seen), self.shots.track());
         Scan { calibration, phantom, sightings, track, place, lag }.fit(self.options)
     }
 }
 
-fn late(calibration: &Calibration, fit: &Fit) -> bool {
-    (fit.lag.seconds() - calibration.image_lag.seconds()).abs() > LAG_MATTERS_S
+fn labelled(seen: &[Seen]) -> usize {
+    seen.iter().filter(|s| s.labels.is_ok()).count()
 }

@@ -54,7 +54,7 @@ fn from_start(
 }
 
 /// Where the image is by what is nominal, when all of it is.
-fn nominal(options: &SpatialOptions) -> Option<Prediction> {
+pub(super) fn nominal(options: &SpatialOptions) -> Option<Prediction> {
     Some(Prediction {
         probe_from_image: options.nominal?,
         world_from_phantom: options.place?.pose(),
