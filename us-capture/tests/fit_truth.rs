@@ -174,3 +174,19 @@ fn the_stated_error_is_the_true_one() {
         assert!((0.77..1.3).contains(&lag), "{capture:?}: {lag}");
     }
 }
+
+#[test]
+fn images_at_one_place_promise_no_more_than_one_of_them() {
+    let mut dice = Dice::new(77);
+    let phantom = zs(&mut dice, 3, 1);
+    let capture = Capture { tracker: (1e-4, 1e-3), dot_px: 0.3, ..Capture::default() };
+    let truth = captured(&mut dice, phantom, &capture);
+    let error = |times: usize| {
+        let sightings: Vec<_> = truth.sightings.iter().flat_map(|s| vec![s.clone(); times]).collect();
+        let options = FitOptions::new(truth.spacing, PhantomPlace::prior(truth.world_from_phantom));
+        let found = fit(&truth.phantom, &sightings, &truth.track, &options, None).unwrap();
+        found.uncertainty.standard_error_map(800, 600).mean_m()
+    };
+    let (once, four_times) = (error(1), error(4));
+    assert!((four_times / once - 1.0).abs() < 0.15, "{once} once, {four_times} four times");
+}

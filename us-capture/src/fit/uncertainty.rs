@@ -11,6 +11,9 @@ use crate::PixelSpacing;
 
 /// A direction with less than this part of the information that its parameters have alone is open.
 const OPEN: f64 = 1e-11;
+/// A probe that moved and turned by less than this from one image to the next stands still (m, rad): ten times what
+/// an arm shakes, a tenth of what makes another view.
+const ONE_PLACE: (f64, f64) = (0.2e-3, 2e-3);
 /// Points of the standard error's map on each side.
 const GRID: usize = 17;
 
@@ -197,22 +200,36 @@ fn refined(problem: &Problem<'_>, values: &Values, nominal: Pose<World, Phantom>
     nominal * Pose::assume(about * values.place() * about.inverse())
 }
 
-/// What every image says at the end.
+/// What every stop of the probe says at the end.
 struct Told {
     all: Normal,
-    images: Vec<Normal>,
+    /// Images taken at one place share the error of its pose, and count as one; of a probe that moves, every image is
+    /// one by itself.
+    stops: Vec<Normal>,
     /// What of the weights errors really feel: the cost is less curved where dots lie far out.
     curvature: f64,
     /// What the dots' own errors scatter, over what the weights say.
     scatter: f64,
 }
 
+/// What each stop says: images in a row whose poses are the same within [`ONE_PLACE`].
+fn stops(problem: &Problem<'_>, values: &Values) -> Vec<Normal> {
+    let mut stops: Vec<(Pose<World, Probe>, Normal)> = Vec::new();
+    for image in problem.images.iter().filter(|i| i.inside) {
+        let (pose, says) = (image.moment.world_from_probe, problem.image_normal(image, values));
+        match stops.last_mut().map(|(place, stop)| (place.distance(&pose), stop)) {
+            Some(((moved, turned), stop)) if moved < ONE_PLACE.0 && turned < ONE_PLACE.1 => stop.add(&says),
+            _ => stops.push((pose, says)),
+        }
+    }
+    stops.into_iter().map(|(_, stop)| stop).collect()
+}
+
 impl Told {
     fn of(problem: &Problem<'_>, values: &Values) -> Self {
-        let inside = problem.images.iter().filter(|i| i.inside);
-        let images: Vec<Normal> = inside.map(|i| problem.image_normal(i, values)).collect();
+        let stops = stops(problem, values);
         let mut all = Normal::zero();
-        images.iter().for_each(|image| all.add(image));
+        stops.iter().for_each(|stop| all.add(stop));
         let (mut curved, mut weights, mut scattered) = (0.0, 0.0, 0.0);
         for (_, squared) in problem.errors(values) {
             let weight = problem.robust.cost(squared).1;
@@ -221,51 +238,51 @@ impl Told {
             // A dot has two errors.
             scattered += weight * weight * squared / 2.0;
         }
-        Self { all, images, curvature: (curved / weights).clamp(0.2, 1.0), scatter: scattered / weights }
+        Self { all, stops, curvature: (curved / weights).clamp(0.2, 1.0), scatter: scattered / weights }
     }
 
     /// The covariance: inverse curvature, around the scatter of what the images say.
     ///
-    /// Dots of one image share errors (its pose, its stamp), so that counting dots promises too much. What each image
+    /// Dots of one stop share errors (its pose, its stamp), so that counting dots promises too much. What each stop
     /// says as a whole scatters as it really does (the sandwich of Liang and Zeger, Biometrika 73 (1986) 13, by
-    /// image), each image against the fit of all others so that the fit's leaning to it is taken back. With few images
+    /// stop), each against the fit of all others so that the fit's leaning to it is taken back. With few stops
     /// that scatter is itself uncertain, and leans on the dots' own, scaled as a whole.
     fn covariance(&self, active: &[bool; COUNT], problem: &Problem<'_>) -> Result<Square, FitError> {
         let prior = Square::from_diagonal(&problem.prior);
         let inverse = invert(&(self.all.square * self.curvature + prior), active)?;
         let scatter = self.scatter(active, problem);
         let parameters = active.iter().filter(|a| **a).count() as f64;
-        let images = self.images.len() as f64;
-        let trust = images / (images + 3.0 * parameters);
+        let stops = self.stops.len() as f64;
+        let trust = stops / (stops + 3.0 * parameters);
         let effect = self.effect(active, problem);
         let middle = scatter * trust + self.all.square * (effect * (1.0 - trust)) + prior;
         Ok(inverse * middle * inverse)
     }
 
-    /// Sum of squares of what the images say.
+    /// Sum of squares of what the stops say.
     fn scatter(&self, active: &[bool; COUNT], problem: &Problem<'_>) -> Square {
         let prior = Square::from_diagonal(&problem.prior);
         let whole = self.all.square + prior;
         let mut scatter = Square::zeros();
-        for image in &self.images {
-            let others = invert(&(whole - image.square), active);
-            let alone = others.map_or(image.slope, |inverse| whole * (inverse * image.slope));
-            let product = alone * image.slope.transpose();
+        for stop in &self.stops {
+            let others = invert(&(whole - stop.square), active);
+            let alone = others.map_or(stop.slope, |inverse| whole * (inverse * stop.slope));
+            let product = alone * stop.slope.transpose();
             scatter += (product + product.transpose()) / 2.0;
         }
         scatter
     }
 
-    /// How much more the images scatter than their weights say, as a mean over all directions.
+    /// How much more the stops scatter than their weights say, as a mean over all directions.
     fn effect(&self, active: &[bool; COUNT], problem: &Problem<'_>) -> f64 {
         let Ok(inverse) = invert(&(self.all.square + Square::from_diagonal(&problem.prior)), active) else {
             return 1.0;
         };
         let (mut scatter, mut expected) = (0.0, 0.0);
-        for image in &self.images {
-            let part = inverse * image.square;
-            scatter += image.slope.dot(&(inverse * image.slope));
-            // The fit leans to every image a little, and leaves less of its errors than there was.
+        for stop in &self.stops {
+            let part = inverse * stop.square;
+            scatter += stop.slope.dot(&(inverse * stop.slope));
+            // The fit leans to every stop a little, and leaves less of its errors than there was.
             expected += part.trace() - part.component_mul(&part.transpose()).sum();
         }
         if expected > 0.0 { scatter / expected } else { 1.0 }
