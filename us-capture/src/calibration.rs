@@ -74,6 +74,9 @@ pub enum BadCalibration {
     /// The pose is not one, or between other systems.
     #[error("the calibration's probe_from_image: {0}")]
     Pose(#[from] FrameError),
+    /// The phantom's place is none, or between other systems.
+    #[error("the calibration's quality.world_from_phantom: {0}")]
+    Place(FrameError),
     /// A number that no calibration can have.
     #[error("the calibration's {field} is {found}; it has to be {wanted}")]
     Number {

@@ -1,6 +1,7 @@
 //! [`Quality`]: how good a calibration is, in the field's own measures, as it is stored with it.
 
 use nalgebra::DMatrix;
+use probepath_frames::{NamedPose, Phantom, Pose, World};
 use serde::{Deserialize, Serialize};
 
 use super::{BadCalibration, check};
@@ -33,6 +34,9 @@ pub struct Quality {
     /// The water the phantom stood in, when the scale was corrected by it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub water: Option<Water>,
+    /// Where the phantom stood, as the fit found it: where a check looks for it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub world_from_phantom: Option<NamedPose>,
     /// The covariance of what was fitted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub covariance: Option<Covariance>,
@@ -144,6 +148,7 @@ impl Quality {
             found: None,
             repeatability: None,
             water: None,
+            world_from_phantom: Some(NamedPose::from(&fit.world_from_phantom)),
             covariance: Some(Covariance::of(&fit.uncertainty)),
         }
     }
@@ -171,7 +176,17 @@ impl Quality {
         if let Some(water) = &self.water {
             water.check()?;
         }
+        self.place()?;
         self.covariance.as_ref().map_or(Ok(()), Covariance::check)
+    }
+
+    /// Where the phantom stood when this was calibrated; `None` in an older file.
+    ///
+    /// # Errors
+    /// When what is stored is between other systems, or no pose.
+    pub fn place(&self) -> Result<Option<Pose<World, Phantom>>, BadCalibration> {
+        let place = self.world_from_phantom.as_ref().map(NamedPose::check::<World, Phantom>);
+        place.transpose().map_err(BadCalibration::Place)
     }
 }
 

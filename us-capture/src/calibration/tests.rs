@@ -1,4 +1,5 @@
 use probepath_frames::nalgebra::{Isometry3, Vector3};
+use probepath_frames::{Phantom, World};
 use proptest::prelude::*;
 
 use super::*;
@@ -34,6 +35,11 @@ fn what_is_written_is_what_is_read() {
     assert!(text.contains("depth_mm = 70.0") && text.contains("image_lag_ms = -64.8"), "{text}");
 }
 
+fn place() -> Pose<World, Phantom> {
+    // FRAMES: made up for the test.
+    Pose::assume(Isometry3::new(Vector3::new(0.25, -0.125, 0.0), Vector3::new(0.0, 0.5, 0.0)))
+}
+
 fn quality() -> Quality {
     let errors = ErrorsMm {
         mids: 300,
@@ -59,6 +65,7 @@ fn quality() -> Quality {
         }),
         repeatability: Some(RepeatabilityMm { calibrations: 10, points: 600, c_rms_mm: 0.4, mean_mm: 0.35 }),
         water: Some(Water { temperature_celsius: 20.0, speed_of_sound_m_s: 1482.3, assumed_m_s: 1540.0 }),
+        world_from_phantom: Some(NamedPose::from(&place())),
         covariance: Some(Covariance {
             parameters: vec!["image_turn_x".into(), "lag".into()],
             units: vec!["rad".into(), "s".into()],
@@ -75,6 +82,7 @@ fn known_well() -> Calibration {
 fn all_that_is_known_of_it_is_written_and_read() {
     let text = known_well().to_toml().unwrap();
     assert_eq!(Calibration::from_toml(&text).unwrap(), known_well(), "{text}");
+    assert_eq!(quality().place().unwrap(), Some(place()));
     let covariance = quality().covariance.unwrap();
     assert_eq!(covariance.about(&["lag", "image_turn_y"]), nalgebra::dmatrix![4e-6, 0.0; 0.0, 0.0]);
 }
@@ -88,6 +96,8 @@ fn a_quality_that_cannot_be_is_refused_with_the_reason() {
         ("line_rms_mm = 0.3", "line_rms_mm = -0.3", "quality.found"),
         ("temperature_celsius = 20.0", "temperature_celsius = 293.0", "temperature_celsius"),
         ("speed_of_sound_m_s = 1482.3", "speed_of_sound_m_s = 1.48", "speed_of_sound_m_s"),
+        ("of = \"Phantom\"", "of = \"Image\"", "World_T_Phantom"),
+        ("[0.25, -0.125, 0.0]", "[0.25, nan, 0.0]", "world_from_phantom"),
         ("\"lag\"", "\"image_turn_x\"", "twice"),
         ("\"s\"", "\"ms\"", "\"ms\""),
         ("[0.000001, -0.0000003]", "[0.000001]", "square"),

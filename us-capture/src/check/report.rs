@@ -5,13 +5,16 @@ use std::collections::BTreeMap;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-use super::{Change, Check, Verdict};
+use super::{Change, Check, Misfit, Verdict};
+use crate::errors::Summary;
 
 /// A check's answer in millimetres, degrees and milliseconds; axes are the probe's.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CheckReport {
     /// Whether the calibration holds.
     pub verdict: Verdict,
+    /// It holds where the phantom was seen; of the rest of the image the scan says nothing that can be relied on.
+    pub seen_only: bool,
     /// What moved, or what is missing, in words, and what to do.
     pub words: String,
     /// Images of the scan.
@@ -22,6 +25,25 @@ pub struct CheckReport {
     pub refused: BTreeMap<&'static str, usize>,
     /// How far the image is from where it was calibrated; `None` when the scan says nothing of it.
     pub change: Option<ChangeReport>,
+    /// How the stored calibration explains the dots; `None` when they could not be fitted.
+    pub misfit: Option<MisfitReport>,
+}
+
+/// The errors of the scan's dots: root mean squares; `None` when there was no such dot.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MisfitReport {
+    /// Of middle wires, by the stored calibration.
+    pub mid_rms_mm: Option<f64>,
+    /// Distances from the wires, by the stored calibration.
+    pub line_rms_mm: Option<f64>,
+    /// Of middle wires, by the scan's own fit.
+    pub own_mid_rms_mm: Option<f64>,
+    /// Distances from the wires, by the scan's own fit.
+    pub own_line_rms_mm: Option<f64>,
+    /// How far the stored calibration is off where the phantom was seen.
+    pub excess_mm: f64,
+    /// How far the probe turned about its axes, the second largest of the three.
+    pub turned_deg: f64,
 }
 
 /// How far the image is from where it was calibrated.
@@ -63,11 +85,27 @@ impl CheckReport {
         }
         Self {
             verdict: check.verdict,
+            seen_only: check.seen_only,
             words: check.words.clone(),
             images: check.images,
             labelled: check.labelled,
             refused,
             change: check.change.as_ref().map(ChangeReport::of),
+            misfit: check.misfit.as_ref().map(MisfitReport::of),
+        }
+    }
+}
+
+impl MisfitReport {
+    fn of(misfit: &Misfit) -> Self {
+        let mm = |summary: &Summary| (summary.count > 0).then_some(summary.rms_m * 1e3);
+        Self {
+            mid_rms_mm: mm(&misfit.mid),
+            line_rms_mm: mm(&misfit.line),
+            own_mid_rms_mm: mm(&misfit.own_mid),
+            own_line_rms_mm: mm(&misfit.own_line),
+            excess_mm: misfit.excess_m() * 1e3,
+            turned_deg: misfit.turned_rad.to_degrees(),
         }
     }
 }

@@ -2,11 +2,9 @@
 
 use probepath_frames::{Image, Pose, Probe, Span};
 
-use super::{
-    Check, CheckError, CheckOptions, Scan, around, assumed_m_s, concluded, rows, same_phantom, too_little,
-};
+use super::{Check, CheckError, CheckOptions, Scan, around, assumed_m_s, rows, same_phantom, too_little};
 use crate::Calibration;
-use crate::fit::{Fit, Lag, PhantomPlace, speed_of_sound_in_water};
+use crate::fit::{Lag, PhantomPlace, Sighting, speed_of_sound_in_water};
 use crate::phantom::WirePhantom;
 use crate::shots::Shots;
 use crate::spatial::{Doing, Seen, Spatial, SpatialError, SpatialOptions, predicted, sightings};
@@ -44,8 +42,8 @@ pub fn check_shots(
         }
         seen => seen?,
     };
-    let fitted = looking.fit(&seen);
-    let check = concluded(calibration, fitted, (shots.size(), images), options)?;
+    let sightings = sightings(shots, &seen);
+    let check = looking.scan(&sightings).concluded((shots.size(), images), options)?;
     let refused = seen.iter().filter_map(|s| s.labels.as_ref().err().map(|why| (s.number, why.clone())));
     Ok(Check { labelled: labelled(&seen), refused: refused.collect(), ..check })
 }
@@ -95,7 +93,7 @@ impl Looking<'_> {
                 _ => {}
             }
         }
-        if let Ok(fit) = self.fit(&seen) {
+        if let Ok(fit) = self.scan(&sightings(self.shots, &seen)).fit(self.options) {
             let again = self.predicted(fit.probe_from_image, fit.lag)?;
             if labelled(&again) > labelled(&seen) {
                 seen = again;
@@ -126,15 +124,14 @@ impl Looking<'_> {
         }
     }
 
-    /// What these labels say, the lag free where the images have stamps.
-    fn fit(&self, seen: &[Seen]) -> Result<Fit, CheckError> {
+    /// The labelled dots, the lag free where the images have stamps.
+    fn scan<'s>(&'s self, sightings: &'s [Sighting]) -> Scan<'s> {
         let lag = match self.shots.stamped {
             true => around(self.calibration, self.options),
             false => Lag::Known(Span::ZERO),
         };
         let (calibration, phantom, place) = (self.calibration, self.phantom, self.place);
-        let (sightings, track) = (&sightings(self.shots, seen), self.shots.track());
-        Scan { calibration, phantom, sightings, track, place, lag }.fit(self.options)
+        Scan { calibration, phantom, sightings, track: self.shots.track(), place, lag }
     }
 }
 

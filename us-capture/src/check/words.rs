@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Change, CheckOptions, Verdict};
+use super::{Change, CheckOptions, Misfit, Verdict};
 
 /// Standard errors that make a difference worth a word.
 const CLEAR: f64 = 3.0;
@@ -15,6 +15,31 @@ pub(super) fn told(verdict: Verdict, change: &Change, options: &CheckOptions) ->
     };
     let rows = rows(change, options).map(|rows| format!("; {rows}")).unwrap_or_default();
     said + &rows
+}
+
+/// It holds by the dots, not by the covariance.
+pub(super) fn seen_only(change: &Change, misfit: &Misfit, options: &CheckOptions) -> String {
+    let turned = misfit.turned_rad.to_degrees();
+    let lag = match change.lag_s {
+        Some((late, error)) if change.is_late(options) => {
+            format!(" and the lag off by {:+.1} +- {:.1} ms", late * 1e3, error * 1e3)
+        }
+        _ => String::new(),
+    };
+    let rows = rows(change, options).map(|rows| format!("; {rows}")).unwrap_or_default();
+    format!(
+        "the calibration holds where the phantom was seen: the middle wires are off by {:.2} mm and all dots by {:.2} mm \
+         from their wires (the scan's own fit: {:.2} and {:.2} mm; {:.2} mm more are allowed); beyond them this scan \
+         cannot tell: its own fit has the worst point of the image {}{lag}, but the probe turned only \
+         {turned:.0} degrees about two of its axes, so that errors of the whole recording may make that: tilt it by 15 degrees both ways to \
+         check all of the image{rows}",
+        misfit.mid.rms_m * 1e3,
+        misfit.line.rms_m * 1e3,
+        misfit.own_mid.rms_m * 1e3,
+        misfit.own_line.rms_m * 1e3,
+        options.tolerance_m * 1e3,
+        worst(change)
+    )
 }
 
 fn worst(change: &Change) -> String {

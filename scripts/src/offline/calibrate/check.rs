@@ -3,9 +3,9 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use probepath_us_capture::Calibration;
 use probepath_us_capture::check::{CheckOptions, CheckReport, Verdict, check_shots};
 use probepath_us_capture::fit::PhantomPlace;
+use probepath_us_capture::{Calibration, Quality};
 use serde::Serialize;
 
 use super::request::CheckRequest;
@@ -39,8 +39,7 @@ pub fn check(request: &CheckRequest, progress: &dyn Progress) -> Result<Checked,
     let calibration = Calibration::read(&request.calibration)?;
     let subject = Subject::read(&request.subject)?;
     let recording = subject.record(&request.sequence, &request.subject)?;
-    let place = subject.place(request.phantom_to_reference.as_ref())?;
-    let place = PhantomPlace::prior(place.ok_or(CalibrateError::NoPlace { wish: "prior" })?);
+    let (place, whence) = place(request, &subject, &calibration)?;
     let check_options = CheckOptions {
         water_celsius: request.water_celsius,
         mask: options::mask(recording.region, &request.subject)?,
@@ -54,13 +53,30 @@ pub fn check(request: &CheckRequest, progress: &dyn Progress) -> Result<Checked,
         id: calibration.id,
         sequence: request.sequence.clone(),
         report: found.report(),
-        notes: [subject.notes, recording.notes].concat(),
+        notes: [subject.notes, recording.notes, whence].concat(),
     })
+}
+
+/// The phantom's place with its note: as given by hand, else as the calibration found it, else the configuration's.
+fn place(
+    request: &CheckRequest,
+    subject: &Subject,
+    calibration: &Calibration,
+) -> Result<(PhantomPlace, Vec<String>), CalibrateError> {
+    let stored = calibration.quality.as_ref().map(Quality::place).transpose()?.flatten();
+    if let (Some(stored), None) = (stored, &request.phantom_to_reference) {
+        let note = "the phantom is taken to stand where the calibration found it: give --phantom-to-reference if it \
+                    was put elsewhere";
+        return Ok((PhantomPlace::prior(stored), vec![note.into()]));
+    }
+    let place = subject.place(request.phantom_to_reference.as_ref())?;
+    Ok((PhantomPlace::prior(place.ok_or(CalibrateError::NoPlace { wish: "prior" })?), Vec::new()))
 }
 
 impl fmt::Display for Checked {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let verdict = match self.report.verdict {
+            Verdict::Holds if self.report.seen_only => "PASS where the phantom was seen",
             Verdict::Holds => "PASS",
             Verdict::Moved => "FAIL",
             Verdict::CannotTell => "CANNOT TELL",
@@ -73,6 +89,14 @@ impl fmt::Display for Checked {
                 f,
                 "the worst pixel moved {:.2} ± {:.2} mm, the image {:.2} mm on average",
                 change.worst_mm, change.worst_error_mm, change.mean_mm
+            )?;
+        }
+        if let Some(misfit) = &self.report.misfit {
+            let mid = misfit.mid_rms_mm.map(|mid| format!("middle wires {mid:.2} mm, ")).unwrap_or_default();
+            let line = misfit.line_rms_mm.unwrap_or(f64::NAN);
+            writeln!(
+                f,
+                "stored calibration on the scan's dots (rms): {mid}distance from wires {line:.2} mm"
             )?;
         }
         for (code, count) in &self.report.refused {
