@@ -26,7 +26,7 @@ use probepath_robot::{Guard, MotionLimits, Operator};
 use probepath_us_capture::exam::{Attachment, Event, ExamHeader, ExamWriter, Level, Pace, Written};
 
 pub use calibrate::{CalibrateWish, Calibrated, Checked, StandardError};
-pub use cell::{CellFile, ForceFile, LimitsFile};
+pub use cell::{CellFile, ForceFile, LimitsFile, StoredCalibration};
 pub use error::SessionError;
 pub use locate::Located;
 pub use recorded::protocol_of;

@@ -53,7 +53,8 @@ pub use linear::{linear_start, start_from_planes};
 pub use options::{FitOptions, Lag, PhantomPlace, Robust, Scale};
 pub use parameters::Parameter;
 pub use uncertainty::{StandardErrorMap, Uncertainty};
-pub use water::speed_of_sound_in_water;
+pub(crate) use water::{deeper_in_tissue_m, first_row_m};
+pub use water::{in_tissue, speed_of_sound_in_water};
 pub use weak::Weakness;
 
 /// The labelled dots of one image.

@@ -1,9 +1,8 @@
 //! The calibration step: B-scans of a phantom become a calibration, and other B-scans say how good it is.
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use probepath_frames::{Image, Pose, Probe, Span};
 use probepath_us_capture::exam::Attachment;
-use probepath_us_capture::fit::{Lag, Parameter, PhantomPlace, Scale, speed_of_sound_in_water};
+use probepath_us_capture::fit::{Lag, Parameter, PhantomPlace, Scale, in_tissue, speed_of_sound_in_water};
 use probepath_us_capture::label::Expect;
 use probepath_us_capture::plan::Expected;
 use probepath_us_capture::spatial::{Doing, Evaluation, Spatial, SpatialError, SpatialOptions};
@@ -119,15 +118,10 @@ impl Calibrated {
         }
     }
 
-    /// Where the image's plane is for scanning tissue, with the machine's own spacing. In water sound is slower than
-    /// the machine assumes, so that the first row was less deep under the face, in the ratio of the rows' sizes.
+    /// Where the image's plane is for scanning tissue, with the machine's own spacing.
     pub fn in_tissue(&self) -> Pose<Probe, Image> {
-        let shown = self.spatial.fit.spacing.y_m / self.setting.spacing.y_m;
-        let first_row_m = self.setting.window_top_m + self.setting.spacing.y_m / 2.0;
-        let deeper = Translation3::new(0.0, first_row_m * (1.0 - shown), 0.0);
-        // FRAMES: the same axes, the first row's centre as deep as it is in tissue.
-        let moved = Pose::<Image, Image>::assume(Isometry3::from_parts(deeper, UnitQuaternion::identity()));
-        self.spatial.fit.probe_from_image * moved
+        let fit = &self.spatial.fit;
+        in_tissue(&fit.probe_from_image, fit.spacing, &self.setting)
     }
 
     /// What was found: on images that it has not used, or, unchecked, on its own.

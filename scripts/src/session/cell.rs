@@ -1,12 +1,12 @@
 //! The cell: its file, and the arm, the machine and the facts that come from it.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use probepath_frames::{Direction, Point, Span, World};
 use probepath_robot::{
     Arm, Guard, GuardLimits, Joints, Model, MotionLimits, Operator, Plane, Workspace, probe_place,
 };
-use probepath_sim::{Bench, CellConfig, SimulatedCell};
+use probepath_sim::{Bench, CellConfig, Nominal, SimulatedCell};
 use probepath_us_capture::{BScanSource, Calibration, CalibrationError};
 use serde::{Deserialize, Serialize};
 
@@ -19,6 +19,13 @@ use super::recorder::Facts;
 pub struct CellFile {
     /// The cell's name, for the report.
     pub name: String,
+    /// A stored calibration of this machine's setting, relative to the cell file's folder; without one the nominal one
+    /// is used.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<PathBuf>,
+    /// What that file holds, once it was read ([`CellFile::read`]).
+    #[serde(skip)]
+    pub stored: Option<StoredCalibration>,
     /// The arm's limits beyond its URDF.
     pub limits: LimitsFile,
     /// The force limits of the guard.
@@ -27,6 +34,15 @@ pub struct CellFile {
     pub above_table_mm: f64,
     /// The simulated cell that stands in for arm, leg and ultrasound machine.
     pub simulated: CellConfig,
+}
+
+/// A calibration that a cell names.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StoredCalibration {
+    /// Where it was read from.
+    pub path: PathBuf,
+    /// What is in it.
+    pub calibration: Calibration,
 }
 
 /// Joint limits that no URDF holds.
@@ -55,6 +71,8 @@ impl Default for CellFile {
     fn default() -> Self {
         Self {
             name: "simulated cell".into(),
+            calibration: None,
+            stored: None,
             limits: LimitsFile::default(),
             force: ForceFile::default(),
             above_table_mm: 20.0,
@@ -85,17 +103,29 @@ impl CellFile {
     /// The cell of a file.
     ///
     /// # Errors
-    /// When it cannot be read, is no TOML, or has a field that no cell has; the error names the line.
+    /// When it cannot be read, is no TOML, or has a field that no cell has; the error names the line. When the calibration
+    /// that it names cannot be read.
     pub fn read(path: &Path) -> Result<Self, SessionError> {
         let text = std::fs::read_to_string(path).map_err(|source| SessionError::File {
             doing: "read the cell file",
             path: path.into(),
             source,
         })?;
-        Self::parse(&text, &path.display().to_string())
+        let file = Self::parse(&text, &path.display().to_string())?;
+        file.with_calibration(path.parent().unwrap_or_else(|| Path::new("")))
     }
 
-    /// The cell of a text; `name` is for messages.
+    /// With the calibration that it names, from a folder.
+    fn with_calibration(self, folder: &Path) -> Result<Self, SessionError> {
+        let Some(path) = self.calibration.as_ref().map(|path| folder.join(path)) else { return Ok(self) };
+        match Calibration::read(&path) {
+            Ok(calibration) => Ok(Self { stored: Some(StoredCalibration { path, calibration }), ..self }),
+            Err(source) => Err(SessionError::CellCalibration { cell: self.name, path, source }),
+        }
+    }
+
+    /// The cell of a text; `name` is for messages. A calibration that it names is read when a session connects, from the
+    /// folder that the program runs in.
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -156,7 +186,8 @@ impl Cell {
     /// Connects.
     ///
     /// # Errors
-    /// When the simulated cell cannot be built, or the limits cannot be kept.
+    /// When the simulated cell cannot be built, the limits cannot be kept, or the calibration that the file names belongs
+    /// to another setting of the machine.
     pub(super) fn connect(file: &CellFile, seed: u64) -> Result<Self, SessionError> {
         let simulated = SimulatedCell::new(&file.simulated, seed)?;
         let nominal = simulated.nominal();
@@ -166,21 +197,7 @@ impl Cell {
             flange_from_probe: nominal.flange_from_probe,
         };
         let limits = motion_limits(&facts.model, &file.limits)?;
-        let calibration = Calibration {
-            id: "nominal".into(),
-            date: "none".into(),
-            phantom: "none: the holder's drawing".into(),
-            probe_from_image: nominal.probe_from_image(&nominal.setting),
-            setting: nominal.setting,
-            image_lag: Span::ZERO,
-            error: CalibrationError {
-                // What the cell's file says of the calibration it gives; nobody has measured it.
-                rms_mm: file.simulated.machine.calibration_error_mm,
-                sd_mm: 0.0,
-                held_out: false,
-            },
-            quality: None,
-        };
+        let calibration = calibration(file, nominal)?;
         Ok(Self {
             file: file.clone(),
             arm: Box::new(simulated.arm()),
@@ -223,6 +240,40 @@ impl Cell {
     }
 }
 
+/// The calibration that scans use: the stored one that the file names, or the nominal one.
+fn calibration(file: &CellFile, nominal: &Nominal) -> Result<Calibration, SessionError> {
+    let read = || file.clone().with_calibration(Path::new(""));
+    let file = if file.stored.is_none() { &read()? } else { file };
+    let Some(StoredCalibration { path, calibration }) = &file.stored else {
+        return Ok(nominal_calibration(file, nominal));
+    };
+    calibration.check_setting(&nominal.setting).map_err(|source| SessionError::CellCalibration {
+        cell: file.name.clone(),
+        path: path.clone(),
+        source,
+    })?;
+    Ok(calibration.clone())
+}
+
+/// What is known before anybody calibrated.
+fn nominal_calibration(file: &CellFile, nominal: &Nominal) -> Calibration {
+    Calibration {
+        id: "nominal".into(),
+        date: "none".into(),
+        phantom: "none: the holder's drawing".into(),
+        probe_from_image: nominal.probe_from_image(&nominal.setting),
+        setting: nominal.setting,
+        image_lag: Span::ZERO,
+        error: CalibrationError {
+            // What the cell's file says of the calibration it gives; nobody has measured it.
+            rms_mm: file.simulated.machine.calibration_error_mm,
+            sd_mm: 0.0,
+            held_out: false,
+        },
+        quality: None,
+    }
+}
+
 /// The limits of every command: the URDF's, and the file's for what no URDF holds.
 fn motion_limits(model: &Model, file: &LimitsFile) -> Result<MotionLimits, SessionError> {
     let n = model.joints();
@@ -243,3 +294,6 @@ fn motion_limits(model: &Model, file: &LimitsFile) -> Result<MotionLimits, Sessi
         .map_err(|e| SessionError::Cell { file: "the cell's [limits]".into(), why: e.to_string() })?;
     Ok(limits)
 }
+
+#[cfg(test)]
+mod tests;

@@ -69,6 +69,20 @@ pub enum SessionError {
     /// A calibration that cannot be written or used.
     #[error(transparent)]
     Calibration(#[from] BadCalibration),
+    /// The stored calibration that a cell names.
+    #[error(
+        "{cell}: its calibration {}: {source}. `probepath scan calibrate` makes one of the cell's setting; without the line \
+         `calibration = ...` in the cell's file the nominal one is used",
+        path.display()
+    )]
+    CellCalibration {
+        /// The cell's name.
+        cell: String,
+        /// The calibration's file.
+        path: PathBuf,
+        /// What is wrong with it, or what differs.
+        source: BadCalibration,
+    },
     /// A motion was stopped by a fault.
     #[error("{step}: {source}")]
     Motion {

@@ -5,9 +5,9 @@ use std::collections::VecDeque;
 use probepath_frames::Stamp;
 use probepath_robot::{Command, Joints, RecordedArm, State};
 use probepath_us_capture::exam::{Attachment, Exam, TickRecord};
-use probepath_us_capture::{BScan, BScanSource, SourceFault};
+use probepath_us_capture::{BScan, BScanSource, Calibration, SourceFault};
 
-use super::{CellFile, Opening, Session, SessionError};
+use super::{CellFile, Opening, Session, SessionError, StoredCalibration};
 use crate::protocol::Protocol;
 
 impl Session {
@@ -20,7 +20,10 @@ impl Session {
         let cell = exam.attachment(Attachment::CELL).ok_or(SessionError::Order(
             "the exam holds no cell file: it was not recorded to its beginning",
         ))?;
-        let cell = CellFile::parse(cell.text()?, "the exam's cell file")?;
+        let mut cell = CellFile::parse(cell.text()?, "the exam's cell file")?;
+        if cell.calibration.is_some() {
+            cell.stored = Some(calibration_of(exam)?);
+        }
         let seed = exam.header.seed.unwrap_or(opening.seed);
         let mut session = Self::open(Opening { cell, seed, ..opening })?;
         let rows: Vec<_> = exam.ticks.iter().map(row).collect::<Result<_, _>>()?;
@@ -29,6 +32,15 @@ impl Session {
         session.cell.machine = Box::new(RecordedMachine::of(exam));
         Ok(session)
     }
+}
+
+/// The calibration that an exam was recorded with: its file may be gone, or another by now.
+fn calibration_of(exam: &Exam) -> Result<StoredCalibration, SessionError> {
+    let text = exam
+        .attachment(Attachment::CALIBRATION)
+        .ok_or(SessionError::Order("the exam holds no calibration: it was not recorded to its beginning"))?;
+    let calibration = Calibration::from_toml(text.text()?)?;
+    Ok(StoredCalibration { path: Attachment::CALIBRATION.into(), calibration })
 }
 
 /// The protocol that an exam was recorded with.

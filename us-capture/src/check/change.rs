@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix3, SMatrix, SVector, Translation3, Vector3};
 
 use super::{CheckError, CheckOptions, Verdict};
-use crate::fit::{Fit, Parameter};
+use crate::fit::{self, Fit, Parameter};
 use crate::{Calibration, Covariance, PixelSpacing, Setting};
 
 /// Points of the comparison on each side of the image.
@@ -186,7 +186,7 @@ fn seven(covariance: &Covariance) -> SMatrix<f64, 7, 7> {
 /// In water sound is slower than the machine takes it to be, so that the first row was less deep under the face, in the
 /// ratio of the rows' sizes. In the stored calibration's own medium the ratio is one, and nothing changes.
 fn in_tissue(calibration: &Calibration, fit: &Fit) -> (Isometry3<f64>, SMatrix<f64, 6, 7>) {
-    let first_row_m = first_row_m(&calibration.setting);
+    let first_row_m = fit::first_row_m(&calibration.setting);
     let deeper = deeper(&calibration.setting, fit.spacing);
     let found = *fit.probe_from_image.isometry();
     let turn = found.rotation.to_rotation_matrix().into_inner();
@@ -196,14 +196,9 @@ fn in_tissue(calibration: &Calibration, fit: &Fit) -> (Isometry3<f64>, SMatrix<f
     (found * Translation3::from(deeper), by)
 }
 
-/// Depth of the first row under the face.
-fn first_row_m(setting: &Setting) -> f64 {
-    setting.window_top_m + setting.spacing.y_m / 2.0
-}
-
 /// By how much the first row lies deeper with the setting's rows than with those that are shown, along the rows.
 pub(super) fn deeper(setting: &Setting, shown: PixelSpacing) -> Vector3<f64> {
-    Vector3::y() * (first_row_m(setting) * (1.0 - shown.y_m / setting.spacing.y_m))
+    Vector3::y() * fit::deeper_in_tissue_m(shown, setting)
 }
 
 fn grid((width, height): (usize, usize)) -> impl Iterator<Item = [f64; 2]> {

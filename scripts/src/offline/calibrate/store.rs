@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use probepath_us_capture::errors::{Found as Errors, Summary};
-use probepath_us_capture::fit::{Fit, speed_of_sound_in_water};
-use probepath_us_capture::{Calibration, CalibrationError, FoundMm, Quality, Setting, Water};
+use probepath_us_capture::fit::{Fit, in_tissue, speed_of_sound_in_water};
+use probepath_us_capture::{Calibration, CalibrationError, FoundMm, PixelSpacing, Quality, Setting, Water};
 
 use super::CalibrateError;
 use super::options::ASSUMED_M_S;
@@ -12,6 +12,8 @@ use super::request::SpatialRequest;
 use super::wishes::Scale;
 
 /// Writes the calibration; `errors` are those on images it had not seen, where there are any (`held_out`).
+///
+/// One whose pixels were corrected by the water is stored for tissue, with the scanner's own spacing, as the robot's is.
 ///
 /// # Errors
 /// When the disk refuses, or a number is one that no calibration can have.
@@ -25,12 +27,15 @@ pub(super) fn write(
 ) -> Result<(), CalibrateError> {
     let name =
         request.sequence.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    let in_water = request.scale == Some(Scale::Water);
+    let setting = setting(if in_water { fit.uncertainty.nominal() } else { fit.spacing }, size);
     let calibration = Calibration {
         id: format!("{}-{}", request.date, name.trim_end_matches(".igs")),
         date: request.date.clone(),
         phantom: phantom.to_owned(),
-        probe_from_image: fit.probe_from_image,
-        setting: setting(fit, size),
+        // Where the spacing is the fitted one this moves nothing.
+        probe_from_image: in_tissue(&fit.probe_from_image, fit.spacing, &setting),
+        setting,
         image_lag: fit.lag,
         error: error(errors, held_out),
         quality: Some(Quality {
@@ -61,15 +66,16 @@ fn error(errors: &Errors, held_out: bool) -> CalibrationError {
     CalibrationError { rms_mm: summary.rms_m * 1e3, sd_mm: (scatter / count).sqrt() * 1e3, held_out }
 }
 
-/// What the size of the picture says of the machine: a sequence says no depth and no focus.
-fn setting(fit: &Fit, (width, height): (usize, usize)) -> Setting {
-    let depth_m = fit.spacing.y_m * height as f64;
+/// What the size of the picture says of the machine. A sequence says no depth and no focus, nor how deep its first row
+/// is: it is taken to be at the face.
+fn setting(spacing: PixelSpacing, (width, height): (usize, usize)) -> Setting {
+    let depth_m = spacing.y_m * height as f64;
     Setting {
         depth_m,
         focus_m: depth_m / 2.0,
         window_top_m: 0.0,
         window_height_m: depth_m,
-        window_width_m: fit.spacing.x_m * width as f64,
-        spacing: fit.spacing,
+        window_width_m: spacing.x_m * width as f64,
+        spacing,
     }
 }

@@ -45,10 +45,30 @@ fn the_arm_calibrates_by_itself_better_than_half_a_millimetre_and_checks_elsewhe
     session.save_calibration(&calibrated, "calibration.toml").unwrap();
     let stored = probepath_us_capture::Calibration::read(&session.file("calibration.toml")).unwrap();
     assert!(stored.error.held_out && stored.check_setting(&images.setting).is_ok());
+    used_for_tissue(&session, &stored);
     session.close().unwrap();
     let exam = probepath_us_capture::exam::Exam::open(&session.exam_path()).unwrap();
     assert!(exam.ticks.iter().any(|tick| tick.phase == "sweep"));
     std::fs::remove_dir_all(&session.opening.out).unwrap();
+}
+
+/// The leg's cell with the bench's machine and holder names the calibration, scans with it, and it is near the truth.
+fn used_for_tissue(bench: &Session, stored: &probepath_us_capture::Calibration) {
+    let machine = bench.cell.file.simulated.machine.clone();
+    let simulated = probepath_sim::CellConfig { machine, ..Default::default() };
+    let calibration = Some("calibration.toml".into());
+    let text = CellFile { calibration, simulated, ..CellFile::default() }.text().unwrap();
+    let path = bench.file("leg.toml");
+    std::fs::write(&path, text).unwrap();
+    let leg = session(CellFile::read(&path).unwrap(), "leg");
+    assert_eq!(&leg.cell.calibration, stored);
+    let truth = leg.cell.simulated.truth().probe_from_image(&stored.setting);
+    let at = |u, v| stored.setting.spacing.point(u, v);
+    for (u, v) in [(0.0, 0.0), (300.0, 300.0)] {
+        let off_m = (stored.probe_from_image * at(u, v)).distance(&(truth * at(u, v)));
+        assert!(off_m < 0.5e-3, "({u}, {v}) is {off_m} m off");
+    }
+    std::fs::remove_dir_all(&leg.opening.out).unwrap();
 }
 
 #[test]
