@@ -136,6 +136,10 @@ fn the_real_fcal_phantom_is_calibrated_better_than_plus_did() {
     assert!(number(&found, "/validation/line_rms_mm") <= 0.32, "{:#}", found["validation"]);
     assert!((number(&found, "/lag_s") - 0.43).abs() <= 0.06, "{}", found["lag_s"]);
     assert!(number(&found, "/standard_error_mm/mean") < number(&found, "/standard_error_mm/p95"));
+    // Ten calibrations of a tenth each scatter, and less than the 1 mm that the whole one promises to err.
+    assert_eq!(found["repeatability"]["calibrations"], 10);
+    let repeats_mm = number(&found, "/repeatability/c_rms_mm");
+    assert!(repeats_mm > 0.0 && repeats_mm < 1.0, "{repeats_mm}");
     assert_eq!(found["plus"]["ImageToProbe"].as_array().unwrap().len(), 16);
     assert_eq!(found["dots"], found["calibration"]["dots"]);
     beside_plus(&found["calibration"], &results, "CalibrationData");

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::Matrix4;
 use probepath_frames::{Image, Phantom, Pose, Probe, World};
 use probepath_us_capture::PixelSpacing;
+use probepath_us_capture::RepeatabilityMm;
 use probepath_us_capture::errors::Found;
 use probepath_us_capture::fit::{Parameter, Uncertainty};
 use probepath_us_capture::spatial::Seen;
@@ -23,6 +24,9 @@ pub struct Spatial {
     pub lag_standard_error_s: Option<f64>,
     /// Standard error of a reconstructed point, over the image.
     pub standard_error_mm: OverImage,
+    /// How well ten calibrations, each from its share of the images, repeat; absent where a share has too few.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub repeatability: Option<RepeatabilityMm>,
     /// Size of a pixel: from column to column, from row to row.
     pub pixel_mm: [f64; 2],
     /// The phantom's name.

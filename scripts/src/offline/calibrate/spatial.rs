@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use probepath_us_capture::RepeatabilityMm;
 use probepath_us_capture::fit::{Fit, Parameter};
 use probepath_us_capture::spatial::{Doing, Seen, Spatial as Found};
 
@@ -11,6 +12,9 @@ use super::request::SpatialRequest;
 use super::subject::{Recording, Subject};
 use super::{CalibrateError, alone, nominal, options, store};
 use crate::progress::Progress;
+
+/// As many as [P1] made of every setting.
+const CALIBRATIONS: usize = 10;
 
 /// Calibrates from a sequence, measures the calibration on another, and leaves what was asked for.
 ///
@@ -90,6 +94,9 @@ fn document(request: &SpatialRequest, subject: &Subject, recording: &Recording, 
         lag_s: fit.lag.seconds(),
         lag_standard_error_s: fit.uncertainty.standard_error_of(Parameter::LAG),
         standard_error_mm: OverImage { mean: error.mean_m() * 1e3, p95: error.p95_m() * 1e3 },
+        // A recording that is too short to be dealt out ten times has no repeatability, and is still a calibration.
+        repeatability: (found.repeatability(&recording.shots, CALIBRATIONS).ok())
+            .map(|repeat| RepeatabilityMm::of(CALIBRATIONS, &repeat)),
         pixel_mm: [fit.spacing.x_m * 1e3, fit.spacing.y_m * 1e3],
         phantom: subject.phantom.name.clone(),
         poses: recording.poses.clone(),

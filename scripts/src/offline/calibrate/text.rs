@@ -59,6 +59,12 @@ impl Spatial {
             f,
             "standard error of a point: {:.3} mm on average over the image, {:.3} mm at the 95th percentile",
             error.mean, error.p95
+        )?;
+        let Some(repeat) = &self.repeatability else { return Ok(()) };
+        let (count, c_rms) = (repeat.calibrations, repeat.c_rms_mm);
+        writeln!(
+            f,
+            "repeatability: C_rms {c_rms:.3} mm over {count} calibrations, each from its share of the images"
         )
     }
 }
