@@ -21,6 +21,7 @@
 //! On skin much stiffer than 4 N/mm (bone right under the probe) these gains oscillate, and the guard's force limit ends
 //! it; [`ContactSettings::for_stiffest`] trades accuracy for such places.
 
+pub(crate) mod pressure;
 mod touch_down;
 
 use probepath_frames::Span;
