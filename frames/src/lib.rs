@@ -18,6 +18,7 @@
 //!
 //! What it does not do: know any robot, image or file. SI units throughout: metres, radians, seconds, newtons.
 
+mod clock_offset;
 mod error;
 mod named;
 mod pose;
@@ -28,11 +29,12 @@ mod track;
 mod vectors;
 mod wrench;
 
+pub use clock_offset::ClockOffset;
 pub use error::{FrameError, TrackError};
 pub use nalgebra;
 pub use named::NamedPose;
 pub use pose::Pose;
-pub use stamp::{ArmClock, Clock, ExamClock, ImageClock, Span, Stamp};
+pub use stamp::{ArmClock, Clock, ExamClock, HostClock, ImageClock, Span, Stamp};
 pub use systems::{Base, Flange, Frame, Image, Leg, Phantom, Probe, World};
 pub use track::Track;
 pub use vectors::{Direction, Point};

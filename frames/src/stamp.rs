@@ -35,6 +35,10 @@ clock! {
     /// The ultrasound machine's clock.
     ImageClock, "image"
 }
+clock! {
+    /// This computer's own monotone clock: when something arrived here.
+    HostClock, "host"
+}
 
 /// An instant: nanoseconds since the zero of clock `C`.
 ///

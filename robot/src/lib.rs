@@ -51,6 +51,7 @@ mod model;
 pub mod motion;
 mod observer;
 mod operator;
+pub mod realtime;
 mod recorded;
 mod run;
 

@@ -287,7 +287,7 @@ fn caught<T>(who: &'static str, call: impl FnOnce() -> T) -> Result<T, StopReaso
 }
 
 /// What a panic said.
-fn message(panic: &(dyn Any + Send)) -> String {
+pub(crate) fn message(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().copied();
     text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("without words").into()
 }
