@@ -52,9 +52,9 @@ pub struct Goal {
     pub published: Option<String>,
     /// How many seeds gave the figure.
     pub counted: usize,
-    /// Whether the worst seed is within the bound; rows without a bound say nothing.
+    /// Whether the figure to reach was met: the worst seed is within the bound; rows without a bound say nothing.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub kept: Option<bool>,
+    pub met: Option<bool>,
 }
 
 /// Why a validation could not be carried out.
@@ -111,14 +111,14 @@ impl Goal {
             at_most,
             published: published.map(str::to_owned),
             counted,
-            kept: at_most.map(|bound| counted > 0 && worst <= bound),
+            met: at_most.map(|bound| counted > 0 && worst <= bound),
         }
     }
 }
 
 impl Goals {
     fn new(goal: &str, seeds: u64, rows: Vec<Goal>) -> Self {
-        let reached = rows.iter().all(|row| row.kept != Some(false));
+        let reached = rows.iter().all(|row| row.met != Some(false));
         Self { goal: goal.to_owned(), seeds, rows, reached }
     }
 }
@@ -129,7 +129,7 @@ impl fmt::Display for Goals {
         writeln!(f, "{:<44} {:>16} {:>8} {:>8}  published", "", "mean ± sd", "worst", "at most")?;
         for row in &self.rows {
             let bound = row.at_most.map_or_else(String::new, |b| format!("{b:.2}"));
-            let mark = match row.kept {
+            let mark = match row.met {
                 Some(true) => "kept",
                 Some(false) => "MISSED",
                 None => "",
@@ -159,11 +159,11 @@ mod tests {
 
     #[test]
     fn what_is_no_number_keeps_no_bound() {
-        assert_eq!(Goal::of("error", &[0.1, f64::NAN, 0.2], Some(0.4), None).kept, Some(false));
+        assert_eq!(Goal::of("error", &[0.1, f64::NAN, 0.2], Some(0.4), None).met, Some(false));
     }
 
     #[test]
     fn no_seed_keeps_no_bound() {
-        assert_eq!(Goal::of("error", &[], Some(0.4), None).kept, Some(false));
+        assert_eq!(Goal::of("error", &[], Some(0.4), None).met, Some(false));
     }
 }
