@@ -13,6 +13,9 @@ pub enum Command {
     Stay,
     /// Be at these joint positions (rad, m) at the next tick.
     Position(Joints),
+    /// Give way to the hand by the arm's own means, until told something else. [`State::commanded`] follows the
+    /// measured position meanwhile, so that what comes next starts from where the hand left the arm.
+    Freedrive,
 }
 
 /// What the arm measured at one tick.
@@ -33,6 +36,67 @@ pub struct State {
     pub wrench: Wrench<Probe>,
     /// The hold-to-move switch: hand guiding goes on only while the operator holds it.
     pub guiding: bool,
+    /// What the arm's own safety system says.
+    pub safety: Safety,
+    /// How old the measurement was, by the host's clock, when the exchange returned it: zero in simulation. It is the
+    /// host's time and not the arm's, so nothing that must be repeatable may hang on it.
+    pub age: Span,
+}
+
+/// What the arm's own safety system says.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Safety {
+    /// All is well.
+    #[default]
+    Normal,
+    /// The arm moves, within its controller's reduced limits.
+    Reduced,
+    /// The arm stopped by itself: a collision, a limit. It is unlocked by hand.
+    ProtectiveStop,
+    /// A safeguard (light curtain, gate, enabling switch) holds the arm.
+    SafeguardStop,
+    /// An emergency stop is pressed.
+    EmergencyStop,
+    /// The arm was found outside its own limits, and may only be moved back by hand.
+    Recovery,
+    /// The safety system itself is at fault.
+    Fault,
+}
+
+impl Safety {
+    /// All of them.
+    pub const ALL: [Self; 7] = [
+        Self::Normal,
+        Self::Reduced,
+        Self::ProtectiveStop,
+        Self::SafeguardStop,
+        Self::EmergencyStop,
+        Self::Recovery,
+        Self::Fault,
+    ];
+
+    /// Whether the arm may move.
+    pub const fn lets_move(self) -> bool {
+        matches!(self, Self::Normal | Self::Reduced)
+    }
+
+    /// Its name in files: `normal`, `protective stop`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Normal => "normal",
+            Self::Reduced => "reduced",
+            Self::ProtectiveStop => "protective stop",
+            Self::SafeguardStop => "safeguard stop",
+            Self::EmergencyStop => "emergency stop",
+            Self::Recovery => "recovery",
+            Self::Fault => "fault",
+        }
+    }
+
+    /// The one of that name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|safety| safety.name() == name)
+    }
 }
 
 /// Why an arm did not give its next state.
@@ -55,7 +119,42 @@ pub enum ArmFault {
         /// The cause, in words.
         why: String,
     },
-    /// The command has another number of joints, or a number that is not finite.
+    /// A safeguard holds the arm.
+    #[error("a safeguard stopped the arm after tick {tick}: {why}; clear it, then recover the arm by hand")]
+    SafeguardStop {
+        /// The last tick seen.
+        tick: u64,
+        /// The cause, in words.
+        why: String,
+    },
+    /// An emergency stop is pressed.
+    #[error(
+        "an emergency stop was pressed after tick {tick}: {why}; release it when the cause is gone, switch the arm \
+         on, then recover it by hand"
+    )]
+    EmergencyStop {
+        /// The last tick seen.
+        tick: u64,
+        /// The cause, in words.
+        why: String,
+    },
+    /// The arm's safety system is at fault, or wants the arm moved back by hand.
+    #[error("the arm's safety system does not let it move after tick {tick}: {why}")]
+    SafetyFault {
+        /// The last tick seen.
+        tick: u64,
+        /// The cause, in words.
+        why: String,
+    },
+    /// The arm heard nothing in time, and stopped by its own watchdog.
+    #[error("the arm stopped by its own watchdog after tick {tick}: {why}; recover it by hand")]
+    WatchdogStop {
+        /// The last tick seen.
+        tick: u64,
+        /// The cause, in words.
+        why: String,
+    },
+    /// The command has another number of joints, or a number that is not finite; or the arm cannot do it.
     #[error("the arm refused the command of tick {tick}: {why}")]
     Refused {
         /// The tick.

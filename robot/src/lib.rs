@@ -28,7 +28,7 @@
 //! # let start = Joints::zeros(6);
 //! # let mut arm = Echo(probepath_robot::State {
 //! #     tick: 0, stamp: probepath_frames::Stamp::ZERO, position: start, velocity: start, commanded: start,
-//! #     wrench: probepath_frames::Wrench::zero(), guiding: false,
+//! #     wrench: probepath_frames::Wrench::zero(), guiding: false, safety: Default::default(), age: Span::ZERO,
 //! # });
 //! # let to = Joints::splat(6, 0.5);
 //! # assert_eq!(go_to(&mut arm, &start, &to).unwrap(), Ending::Done);
@@ -55,7 +55,7 @@ pub mod realtime;
 mod recorded;
 mod run;
 
-pub use arm::{Arm, ArmFault, Command, Controller, State};
+pub use arm::{Arm, ArmFault, Command, Controller, Safety, State};
 pub use black_box::BlackBox;
 pub use contact::pressure::{ContactWatch, Face, Pressure};
 pub use contact::{ContactError, ContactLaw, ContactSettings, TouchDown, TouchDownPhase, TouchDownSettings};

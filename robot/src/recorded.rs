@@ -46,7 +46,11 @@ fn compare(recorded: &Command, given: &Command, tick: u64) -> Result<(), ArmFaul
         if recorded == given {
             return Ok(());
         }
-        let name = |command: &Command| if *command == Command::Stay { "to stay" } else { "to move" };
+        let name = |command: &Command| match command {
+            Command::Stay => "to stay",
+            Command::Position(_) => "to move",
+            Command::Freedrive => "to give way",
+        };
         let why = format!("it was told {} in the recording and {} now", name(recorded), name(given));
         return Err(ArmFault::Refused { tick, why });
     };

@@ -27,6 +27,8 @@ impl Ideal {
             commanded: joints,
             wrench: Wrench::<Probe>::new(Vector3::new(0.1, 0.0, -1.0), Vector3::zeros()),
             guiding: false,
+            safety: Safety::Normal,
+            age: Span::ZERO,
         })
     }
 }

@@ -6,7 +6,7 @@ pub(crate) mod servo;
 
 use nalgebra::Vector3;
 use probepath_frames::{Span, Wrench};
-use probepath_robot::{Arm, ArmFault, Command, Joints, State};
+use probepath_robot::{Arm, ArmFault, Command, Joints, Safety, State};
 
 pub use error::KinematicError;
 pub use sensor::SensorConfig;
@@ -40,8 +40,15 @@ impl SimulatedArm {
 
     /// The command for the servo, or why the arm does not take it.
     fn taken(&self, command: &Command, scene: &Scene) -> Result<Joints, ArmFault> {
-        let Command::Position(next) = command else { return Ok(scene.braked()) };
         let tick = self.ticks + 1;
+        let next = match command {
+            Command::Stay => return Ok(scene.braked()),
+            Command::Position(next) => next,
+            Command::Freedrive => {
+                let why = "it has no means of its own to give way to a hand".into();
+                return Err(ArmFault::Refused { tick, why });
+            }
+        };
         let expected = scene.told().len();
         if next.len() != expected {
             let why = format!("it has {} joints and the arm has {expected}", next.len());
@@ -116,6 +123,8 @@ impl SimulatedArm {
             commanded: *scene.told(),
             wrench,
             guiding: scene.guiding(),
+            safety: Safety::Normal,
+            age: Span::ZERO,
         }
     }
 }

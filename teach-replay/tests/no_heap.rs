@@ -7,7 +7,9 @@
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};
 use nalgebra::{Isometry3, Vector3};
 use probepath_frames::{Pose, Span, Stamp, Wrench};
-use probepath_robot::{Arm, ArmFault, Command, Guard, GuardLimits, Joints, Model, MotionLimits, State, run};
+use probepath_robot::{
+    Arm, ArmFault, Command, Guard, GuardLimits, Joints, Model, MotionLimits, Safety, State, run,
+};
 use probepath_robot::{Controller, Operator, Tick, Wish};
 use probepath_teach_replay::{
     GiveWay, HandGuide, Label, LiftOff, Path, PathPoint, Plan, PlanSettings, ProbeArm, Recorder, Replay,
@@ -51,6 +53,8 @@ impl Ideal {
             commanded: joints,
             wrench: Wrench::zero(),
             guiding: guided > 0,
+            safety: Safety::Normal,
+            age: Span::ZERO,
         };
         Self { arm: probe_arm(), state, guided }
     }

@@ -46,7 +46,7 @@ def main(exam, expected):
     check(metadata["probepath.exam"]["study_code"], expected["study_code"], "study code")
 
     tick, wanted = seen["/tick"][1], expected["tick"]
-    for field in ("tick", "stamp_ns", "stay", "guiding", "phase"):
+    for field in ("tick", "stamp_ns", "stay", "guiding", "phase", "safety", "freedrive", "age_ns"):
         check(getattr(tick, field), wanted[field], field)
     for field in ("command", "position", "velocity", "commanded"):
         check(list(getattr(tick, field)), wanted[field], field)

@@ -52,6 +52,9 @@ fn tick(n: u64, noise: &mut Noise) -> Result<TickRecord, Box<dyn Error>> {
         ),
         guiding: false,
         phase: "replay".into(),
+        safety: "".into(),
+        freedrive: false,
+        age: Span::ZERO,
         // FRAMES: made up, as large as a real one.
         world_from_probe: Some(Pose::assume(Isometry3::translation(
             0.0,

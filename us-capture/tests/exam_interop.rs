@@ -38,6 +38,9 @@ fn tick(n: u64) -> TickRecord {
         wrench: Wrench::new(Vector3::new(0.25, -0.5, -5.0), Vector3::zeros()),
         guiding: n < 500,
         phase: "teach".into(),
+        safety: "reduced".into(),
+        freedrive: false,
+        age: Span::from_nanoseconds(7),
         world_from_probe: Some(pose(n)),
     }
 }
@@ -137,6 +140,7 @@ fn expected() -> Value {
         "joint_names": header().joint_names,
         "tick": {
             "tick": 0, "stamp_ns": 0, "stay": false, "guiding": true, "phase": "teach",
+            "safety": "reduced", "freedrive": false, "age_ns": 7,
             "command": numbers(0, 0.3), "position": numbers(0, 0.0), "velocity": numbers(0, 0.1),
             "commanded": numbers(0, 0.2), "force_n": [0.25, -0.5, -5.0],
             "world_from_probe": numbers_of(tick.world_from_probe.as_ref().unwrap()),

@@ -21,6 +21,9 @@ fn tick(n: i64) -> TickRecord {
         wrench: Wrench::new(Vector3::new(0.0, 0.0, -5.0), Vector3::zeros()),
         guiding: false,
         phase: "replay".into(),
+        safety: "".into(),
+        freedrive: false,
+        age: Span::ZERO,
         // FRAMES: made up for the test.
         world_from_probe: Some(Pose::assume(Isometry3::identity())),
     }

@@ -202,6 +202,8 @@ mod tests {
                 commanded: start,
                 wrench: probepath_frames::Wrench::zero(),
                 guiding: false,
+                safety: crate::Safety::Normal,
+                age: Span::ZERO,
             };
             let mut arrived = None;
             for tick in 0.. {

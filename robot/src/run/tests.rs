@@ -5,7 +5,7 @@ use probepath_frames::{Base, Direction, Point, Probe, Span, Stamp, Wrench, nalge
 use super::*;
 use crate::{
     Brake, GuardLimits, Hold, Joints, MotionLimits, Operator, Phase, Plane, PointToPoint, RecordedArm,
-    Workspace,
+    Safety, Workspace,
 };
 
 const PERIOD: Span = Span::from_milliseconds(2);
@@ -50,6 +50,8 @@ impl TestArm {
             commanded: at,
             wrench: Wrench::zero(),
             guiding: false,
+            safety: Safety::Normal,
+            age: Span::ZERO,
         };
         Self { state, fails, blocked_at: None, rows: Vec::new() }
     }

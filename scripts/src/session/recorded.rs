@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use probepath_frames::Stamp;
-use probepath_robot::{Command, Joints, RecordedArm, State};
+use probepath_robot::{Command, Joints, RecordedArm, Safety, State};
 use probepath_us_capture::exam::{Attachment, Exam, TickRecord};
 use probepath_us_capture::{BScan, BScanSource, Calibration, SourceFault};
 
@@ -61,8 +61,14 @@ pub(crate) fn row(record: &TickRecord) -> Result<(Command, State), SessionError>
             .map_err(|_| SessionError::Order("the exam has more joints than any arm here"))
     };
     let command = match &record.command {
+        None if record.freedrive => Command::Freedrive,
         None => Command::Stay,
         Some(position) => Command::Position(joints(position.as_slice())?),
+    };
+    let safety = match record.safety.as_ref() {
+        "" => Safety::Normal,
+        name => Safety::from_name(name)
+            .ok_or(SessionError::Order("the exam has a safety state that this software does not know"))?,
     };
     let state = State {
         tick: record.tick,
@@ -72,6 +78,8 @@ pub(crate) fn row(record: &TickRecord) -> Result<(Command, State), SessionError>
         commanded: joints(record.commanded.as_slice())?,
         wrench: record.wrench,
         guiding: record.guiding,
+        safety,
+        age: record.age,
     };
     Ok((command, state))
 }

@@ -4,7 +4,7 @@
 use std::borrow::Cow;
 
 use probepath_frames::{Base, Flange, Pose, Probe, Span, Stamp, Track, World};
-use probepath_robot::{Arm, ArmFault, Command, Joints, Model, Observer, Operator, State, Tick, Wish};
+use probepath_robot::{Arm, ArmFault, Command, Joints, Model, Observer, Operator, Safety, State, Tick, Wish};
 use probepath_teach_replay::{Recording, Sample};
 use probepath_us_capture::exam::{ExamWriter, Row, TickRecord};
 use probepath_us_capture::{BScanSource, Capture, CaptureError, PlacedBScan};
@@ -57,7 +57,7 @@ impl Arm for Taped<'_> {
             tick: state.tick,
             stamp: state.stamp,
             command: match command {
-                Command::Stay => None,
+                Command::Stay | Command::Freedrive => None,
                 Command::Position(joints) => Some(row(joints)),
             },
             position: row(&state.position),
@@ -67,6 +67,10 @@ impl Arm for Taped<'_> {
             guiding: state.guiding,
             phase: Cow::Borrowed((self.stand)().phase),
             world_from_probe: Some(self.facts.world_from_base * base_from_probe),
+            // Nothing where all is well, so that it takes no room.
+            safety: Cow::Borrowed(if state.safety == Safety::Normal { "" } else { state.safety.name() }),
+            freedrive: *command == Command::Freedrive,
+            age: state.age,
         });
         Ok(state)
     }

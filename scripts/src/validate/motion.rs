@@ -39,7 +39,7 @@ pub fn shares(exam: &Exam, limits: &MotionLimits) -> Result<Shares, SessionError
         let position = match command {
             Command::Position(position) => position,
             // Told to stay, the arm is where it was last told to be.
-            Command::Stay => state.commanded,
+            Command::Stay | Command::Freedrive => state.commanded,
         };
         past.push(position);
         if past.len() > 4 {

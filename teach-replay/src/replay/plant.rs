@@ -3,7 +3,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 use probepath_frames::{Pose, Span, Stamp, Wrench};
-use probepath_robot::{Arm, ArmFault, Command, Joints, Model, MotionLimits, State};
+use probepath_robot::{Arm, ArmFault, Command, Joints, Model, MotionLimits, Safety, State};
 
 use crate::{Label, Path, PathPoint, ProbeArm, Side};
 
@@ -143,6 +143,8 @@ impl Plant {
             commanded: self.commanded,
             wrench: Wrench::new(felt + noise, Vector3::zeros()),
             guiding: false,
+            safety: Safety::Normal,
+            age: Span::ZERO,
         }
     }
 }

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use foxglove::messages::{Log, RawImage};
 use probepath_frames::nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
-use probepath_frames::{Frame, Pose, Probe, Stamp, Wrench};
+use probepath_frames::{Frame, Pose, Probe, Span, Stamp, Wrench};
 use prost::Message;
 
 use super::proto;
@@ -22,7 +22,11 @@ pub(crate) fn tick(data: &[u8]) -> Result<TickRecord, ExamError> {
     Ok(TickRecord {
         tick: message.tick,
         stamp: Stamp::from_nanoseconds(message.stamp_ns),
-        command: if message.stay { None } else { Some(Row::from_slice(&message.command)?) },
+        command: if message.stay || message.freedrive {
+            None
+        } else {
+            Some(Row::from_slice(&message.command)?)
+        },
         position: Row::from_slice(&message.position)?,
         velocity: Row::from_slice(&message.velocity)?,
         commanded: Row::from_slice(&message.commanded)?,
@@ -30,6 +34,9 @@ pub(crate) fn tick(data: &[u8]) -> Result<TickRecord, ExamError> {
         guiding: message.guiding,
         phase: Cow::Owned(message.phase.clone()),
         world_from_probe: message.world_from_probe.as_ref().map(|pose| read_pose(pose, &what)).transpose()?,
+        safety: Cow::Owned(message.safety.clone()),
+        freedrive: message.freedrive,
+        age: Span::from_nanoseconds(message.age_ns),
     })
 }
 

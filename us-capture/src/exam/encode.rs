@@ -124,7 +124,7 @@ pub(crate) fn tick(record: &TickRecord) -> proto::Tick {
     proto::Tick {
         tick: record.tick,
         stamp_ns: record.stamp.nanoseconds(),
-        stay: record.command.is_none(),
+        stay: record.command.is_none() && !record.freedrive,
         command: record.command.as_ref().map(numbers).unwrap_or_default(),
         position: numbers(&record.position),
         velocity: numbers(&record.velocity),
@@ -133,6 +133,9 @@ pub(crate) fn tick(record: &TickRecord) -> proto::Tick {
         guiding: record.guiding,
         phase: record.phase.clone().into_owned(),
         world_from_probe: record.world_from_probe.as_ref().map(pose),
+        safety: record.safety.clone().into_owned(),
+        freedrive: record.freedrive,
+        age_ns: record.age.nanoseconds(),
     }
 }
 

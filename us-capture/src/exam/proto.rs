@@ -70,6 +70,13 @@ pub(crate) struct Tick {
     pub(crate) phase: String,
     #[prost(message, optional, tag = "11")]
     pub(crate) world_from_probe: Option<Pose>,
+    // Not `required`: where all is as it should be they take no room, and older exams read as that.
+    #[prost(string, tag = "12")]
+    pub(crate) safety: String,
+    #[prost(bool, tag = "13")]
+    pub(crate) freedrive: bool,
+    #[prost(sfixed64, tag = "14")]
+    pub(crate) age_ns: i64,
 }
 
 /// `probepath.BScan`.

@@ -45,7 +45,8 @@ pub struct TickRecord {
     pub tick: u64,
     /// When the joints were measured.
     pub stamp: Stamp,
-    /// The joint positions that were commanded for this tick (rad, m); `None` when the arm was told to stay.
+    /// The joint positions that were commanded for this tick (rad, m); `None` when the arm was told to stay,
+    /// or to give way.
     pub command: Option<Row>,
     /// Measured joint positions (rad, m).
     pub position: Row,
@@ -61,6 +62,12 @@ pub struct TickRecord {
     pub phase: Cow<'static, str>,
     /// Where the probe was, by the arm's model; `None` when nobody asked the model.
     pub world_from_probe: Option<Pose<World, Probe>>,
+    /// What the arm's safety system said (`reduced`, `protective stop`, ...); empty while all is well.
+    pub safety: Cow<'static, str>,
+    /// Whether the arm was told to give way to the hand; then there is no `command`.
+    pub freedrive: bool,
+    /// How old the measurement was, by the host's clock, when it was used; zero in simulation.
+    pub age: Span,
 }
 
 /// How grave an [`Event`] is.
