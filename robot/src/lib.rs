@@ -44,6 +44,7 @@
 mod arm;
 mod black_box;
 mod contact;
+pub mod drivers;
 mod guard;
 mod joints;
 mod limits;

@@ -27,6 +27,8 @@ fn ideal() -> Ideal {
         commanded: zeros,
         wrench: Wrench::zero(),
         guiding: false,
+        safety: Default::default(),
+        age: Span::ZERO,
     };
     Ideal { state, skips: Vec::new() }
 }
