@@ -8,8 +8,12 @@
 //!  HELLO, SESSION = n ──────────────────▶ WAITING ── echoes SESSION = n ──▶ HOLDING
 //!  every tick: SEQUENCE + 1, COMMAND,  ──▶ servoes, holds, gives way; echoes SEQUENCE and STATE
 //!              SETPOINT
-//!  silence, or SEQUENCE stands still  ──▶ stopj, TIMED_OUT: only a HELLO with another SESSION goes on, from HOLDING
+//!  silence, or SEQUENCE stands still,  ──▶ stopj, TIMED_OUT: only a HELLO with another SESSION goes on, from HOLDING
+//!  while the COMMAND is not STAY
 //! ```
+//!
+//! Silence while the last command was [`command::STAY`] changes nothing, so that the host may think between motions;
+//! the arm is at rest then, and [`state::HOLDING`] stays.
 
 /// The number of this map and of what the script does; in [`OUT_PROTOCOL`] from the script's first tick.
 pub const PROTOCOL: i32 = 1;
