@@ -1,8 +1,10 @@
 //! [`SimulatedArm`]: the arm of the simulated cell.
 
 pub(crate) mod error;
+pub(crate) mod give_way;
 pub(crate) mod sensor;
 pub(crate) mod servo;
+pub(crate) mod tool;
 
 use nalgebra::Vector3;
 use probepath_frames::{Span, Wrench};
@@ -10,7 +12,9 @@ use probepath_robot::{Arm, ArmFault, Command, Joints, Safety, State};
 
 pub use error::KinematicError;
 pub use sensor::SensorConfig;
+pub use tool::ToolConfig;
 
+use crate::arm::give_way::GiveWay;
 use crate::cell::{Scene, Shared, TICK};
 use crate::knobs::ArmKnobs;
 
@@ -28,6 +32,7 @@ pub struct SimulatedArm {
     knobs: ArmKnobs,
     ticks: u64,
     since_s: f64,
+    way: GiveWay,
     fault: Option<ArmFault>,
 }
 
@@ -35,19 +40,16 @@ impl SimulatedArm {
     pub(crate) fn new(scene: Shared, knobs: ArmKnobs) -> Self {
         let since_s = scene.lock().now().seconds();
         scene.lock().connect();
-        Self { scene, knobs, ticks: 0, since_s, fault: None }
+        Self { scene, knobs, ticks: 0, since_s, way: GiveWay::default(), fault: None }
     }
 
     /// The command for the servo, or why the arm does not take it.
-    fn taken(&self, command: &Command, scene: &Scene) -> Result<Joints, ArmFault> {
+    fn taken(&mut self, command: &Command, scene: &Scene) -> Result<Joints, ArmFault> {
         let tick = self.ticks + 1;
         let next = match command {
             Command::Stay => return Ok(scene.braked()),
             Command::Position(next) => next,
-            Command::Freedrive => {
-                let why = "it has no means of its own to give way to a hand".into();
-                return Err(ArmFault::Refused { tick, why });
-            }
+            Command::Freedrive => return self.given_way(scene),
         };
         let expected = scene.told().len();
         if next.len() != expected {
@@ -60,6 +62,18 @@ impl SimulatedArm {
         }
         self.possible(next, scene)?;
         Ok(*next)
+    }
+
+    /// Where skin and hand push it, in freedrive: its motors carry arm and tool.
+    fn given_way(&mut self, scene: &Scene) -> Result<Joints, ArmFault> {
+        let (outside, told) = (scene.last().skin + scene.last().hand, scene.told());
+        let velocity = self.way.step(&scene.in_base(&outside), |velocity| velocity, TICK.seconds());
+        let next = scene.moved(told, &velocity, TICK.seconds()).ok_or_else(|| ArmFault::ProtectiveStop {
+            tick: self.ticks,
+            why: "it was guided into a singular posture".into(),
+        })?;
+        self.possible(&next, scene)?;
+        Ok(next)
     }
 
     /// What a real arm's controller would not follow.
@@ -137,6 +151,9 @@ impl Arm for SimulatedArm {
             let rest = scene.braked();
             scene.advance(&rest);
             return Err(fault.clone());
+        }
+        if *command != Command::Freedrive {
+            self.way = GiveWay::default();
         }
         let next = self.taken(command, &scene);
         let told = next.as_ref().copied().unwrap_or_else(|_| scene.braked());

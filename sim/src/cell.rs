@@ -113,6 +113,11 @@ impl SimulatedCell {
         &self.truth
     }
 
+    /// The world, for the controller that serves this cell.
+    pub(crate) fn shared(&self) -> Shared {
+        self.scene.clone()
+    }
+
     /// The cell's time.
     pub fn now(&self) -> Stamp {
         self.scene.lock().now()

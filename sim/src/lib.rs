@@ -33,6 +33,7 @@
 
 mod arm;
 mod cell;
+pub mod controller;
 mod hand;
 mod knobs;
 mod leg;
@@ -47,7 +48,7 @@ mod tissue;
 mod ultrasound;
 mod vessel;
 
-pub use arm::{KinematicError, SensorConfig, SimulatedArm};
+pub use arm::{KinematicError, SensorConfig, SimulatedArm, ToolConfig};
 pub use cell::{
     ArmConfig, ArmKind, CellConfig, CellError, MachineConfig, Moment, Nominal, SimulatedCell, SimulatedHand,
     SubjectConfig, TICK, Touch, Truth, Window,

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::CellError;
-use crate::arm::{KinematicError, SensorConfig};
+use crate::arm::{KinematicError, SensorConfig, ToolConfig};
 use crate::hand::HandConfig;
 use crate::knobs::Knobs;
 use crate::leg::LegConfig;
@@ -79,6 +79,8 @@ pub struct ArmConfig {
     pub braking_rad_s2: f64,
     /// The arm stops by itself when it is pushed harder than this (N).
     pub stops_above_n: f64,
+    /// What it carries.
+    pub tool: ToolConfig,
 }
 
 impl Default for ArmConfig {
@@ -91,6 +93,7 @@ impl Default for ArmConfig {
             kinematic_error: KinematicError::default(),
             braking_rad_s2: 8.0,
             stops_above_n: 100.0,
+            tool: ToolConfig::default(),
         }
     }
 }
@@ -190,6 +193,10 @@ impl CellConfig {
         within("arm.velocity_noise_rad_s", arm.velocity_noise_rad_s, 0.0, 1.0)?;
         within("arm.braking_rad_s2", arm.braking_rad_s2, 0.1, 100.0)?;
         within("arm.stops_above_n", arm.stops_above_n, 1.0, 1e4)?;
+        within("arm.tool.mass_kg", arm.tool.mass_kg, 0.0, 20.0)?;
+        for (axis, mm) in ["x", "y", "z"].iter().zip(arm.tool.centre_of_gravity_mm) {
+            within(&format!("arm.tool.centre_of_gravity_mm.{axis}"), mm, -1000.0, 1000.0)?;
+        }
         if let KinematicError::Figures { accuracy_mm, repeatability_mm } = arm.kinematic_error {
             within("arm.kinematic_error.accuracy_mm", accuracy_mm, 0.0, 20.0)?;
             within("arm.kinematic_error.repeatability_mm", repeatability_mm, 0.0, 5.0)?;

@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use nalgebra::Vector6;
 use probepath_frames::{Pose, Probe, Stamp, Twist, World, Wrench};
 use probepath_robot::{JointLimit, Joints, Model};
 
@@ -9,6 +10,7 @@ use super::config::{ArmConfig, CellConfig};
 use super::nominal::Nominal;
 use super::{CellError, TICK};
 use crate::arm::error::{Blueprint, TrueChain};
+use crate::arm::give_way;
 use crate::arm::sensor::Sensor;
 use crate::arm::servo::Servo;
 use crate::hand::{Course, Hand, HandConfig};
@@ -181,6 +183,47 @@ impl Scene {
         self.servo.told()
     }
 
+    /// How hard the arm brakes by its own means (rad/s²).
+    pub(crate) const fn braking_rad_s2(&self) -> f64 {
+        self.config.braking_rad_s2
+    }
+
+    /// A wrench on the probe in Base's axes, by the model: force, then torque about the probe's origin.
+    pub(crate) fn in_base(&self, wrench: &Wrench<Probe>) -> Vector6<f64> {
+        let base_from_probe = self.nominal.model().forward(self.told()) * self.nominal.flange_from_probe;
+        let turn = base_from_probe.isometry().rotation;
+        let (force, torque) = (turn * wrench.force, turn * wrench.torque);
+        Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z)
+    }
+
+    /// Joints that move the probe with `velocity` (Base's axes) for `seconds`; `None` near a singularity.
+    pub(crate) fn moved(&self, from: &Joints, velocity: &Vector6<f64>, seconds: f64) -> Option<Joints> {
+        give_way::moved(self.nominal.model(), &self.nominal.flange_from_probe, from, velocity, seconds)
+    }
+
+    /// How far the joints are behind a steady motion (s).
+    pub(crate) fn servo_lag_s(&self) -> f64 {
+        self.config.servo_lag_ms * 1e-3
+    }
+
+    /// Whether the motors stand.
+    pub(crate) fn motors_at_rest(&self) -> bool {
+        self.servo.velocity().largest() < 1e-6
+    }
+
+    /// The tool's true weight on the probe.
+    pub(crate) fn tool_weight(&self) -> Wrench<Probe> {
+        self.config.tool.weight(&self.last().world_from_probe, &self.nominal.flange_from_probe)
+    }
+
+    /// The clock shows at least `least` from now on: what was before is moved along, once, before anything looked at it.
+    pub(crate) fn start_clock_at(&mut self, least: Stamp) {
+        let late = least - self.now();
+        if late.nanoseconds() > 0 {
+            self.moments.iter_mut().for_each(|moment| moment.stamp = moment.stamp + late);
+        }
+    }
+
     pub(crate) fn braked(&self) -> Joints {
         self.servo.braked(self.config.braking_rad_s2, TICK.seconds())
     }
@@ -221,7 +264,7 @@ impl Scene {
 
     /// Where the probe truly was between two ticks; `None` before the beginning and after now.
     pub(crate) fn world_from_probe(&self, at: Stamp) -> Option<Pose<World, Probe>> {
-        let since = (at - Stamp::ZERO).nanoseconds();
+        let since = (at - self.moments.first()?.stamp).nanoseconds();
         let index = usize::try_from(since / TICK.nanoseconds()).ok().filter(|_| since >= 0)?;
         let before = self.moments.get(index)?;
         let fraction = (at - before.stamp).seconds() / TICK.seconds();

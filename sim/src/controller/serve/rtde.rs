@@ -1,0 +1,129 @@
+//! RTDE connections, and what every tick sends them.
+
+use std::io::{Read, Write};
+use std::net::{Shutdown, TcpStream};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use super::outbox::{Letter, Outbox};
+use super::{Client, Server, World, spawn};
+use crate::controller::session::{Heard, Session};
+
+/// Serves one connection until it ends.
+pub(super) fn serve(server: &Arc<Server>, mut socket: TcpStream) {
+    let (id, outbox) = (server.keep(&socket), Arc::new(Outbox::default()));
+    server.world().join(id, &outbox);
+    let Ok(writing) = socket.try_clone() else { return server.leave(id) };
+    let letters = outbox.clone();
+    let writer = spawn("rtde-out", move || write(writing, &letters));
+    let mut bytes = [0; 8192];
+    while let Ok(count @ 1..) = socket.read(&mut bytes) {
+        let Some(bytes) = bytes.get(..count) else { break };
+        let heard = server.world().hear(id, bytes);
+        if !heard.replies.is_empty() {
+            outbox.put(Letter { bytes: heard.replies, due: None, fleeting: false, last: heard.close });
+        }
+        server.came.notify_all();
+        if heard.close {
+            break;
+        }
+    }
+    server.leave(id);
+    if let Ok(writer) = writer {
+        let _ = writer.join();
+    }
+}
+
+fn write(mut socket: TcpStream, outbox: &Outbox) {
+    while let Some(letter) = outbox.take() {
+        if socket.write_all(&letter.bytes).is_err() || letter.last {
+            break;
+        }
+    }
+    let _ = socket.shutdown(Shutdown::Both);
+}
+
+impl Server {
+    /// A connection ended: what it held is free again.
+    fn leave(&self, id: u64) {
+        let mut world = self.world();
+        world.owners.retain(|_, owner| *owner != id);
+        if let Some(client) = world.clients.remove(&id) {
+            // What is under way may still leave: the answer that says why it was closed, above all.
+            client.outbox.put(Letter { bytes: Vec::new(), due: None, fleeting: false, last: true });
+        }
+        drop(world);
+        self.forget(id);
+        self.came.notify_all();
+    }
+}
+
+impl World {
+    fn join(&mut self, id: u64, outbox: &Arc<Outbox>) {
+        let session = Session::new(id, self.controller.config.knobs.data_races_start);
+        self.clients.insert(id, Client { session, outbox: outbox.clone() });
+        self.controller.counters.rtde_clients += 1;
+    }
+
+    fn hear(&mut self, id: u64, bytes: &[u8]) -> Heard {
+        let Some(client) = self.clients.get_mut(&id) else {
+            return Heard { close: true, ..Heard::default() };
+        };
+        let heard = client.session.hear(bytes, &mut self.controller, &mut self.owners);
+        for index in &heard.written {
+            if let Some(pulses) = self.pulses.get_mut(*index) {
+                *pulses += 1;
+            }
+        }
+        heard
+    }
+
+    /// How often the input that paces the program was written, while its client is there.
+    pub(super) fn pulses(&self) -> Option<u64> {
+        let index = self.controller.pulse()?;
+        self.owners.contains_key(&format!("input_int_register_{index}")).then_some(())?;
+        self.pulses.get(index).copied()
+    }
+
+    /// Sends everyone the package of this tick; with `anyway`, whether it is due or not.
+    pub(super) fn send(&mut self, anyway: bool) {
+        let tick = self.controller.counters.ticks;
+        let knobs = &self.controller.config.knobs;
+        let has = |ticks: Option<crate::knobs::Ticks>| ticks.is_some_and(|ticks| ticks.has(tick));
+        let lost = has(knobs.stalled) || has(knobs.skipped);
+        let cut = knobs.cut_at_tick == Some(tick) && !anyway;
+        let due = self.due();
+        for client in self.clients.values() {
+            let session = &client.session;
+            let package =
+                if anyway { session.anyway(&self.controller) } else { session.due(&self.controller) };
+            let Some(mut bytes) = package else { continue };
+            if lost && !cut {
+                self.controller.counters.skipped += 1;
+                continue;
+            }
+            if cut {
+                bytes.truncate(bytes.len() / 2);
+            }
+            self.controller.counters.packages += 1;
+            let fleeting = self.controller.config.time == crate::controller::Time::Wall && !cut;
+            self.controller.counters.skipped += client.outbox.put(Letter { bytes, due, fleeting, last: cut });
+        }
+    }
+
+    /// When this tick's packages leave: late by the knobs' latency and jitter.
+    fn due(&mut self) -> Option<Instant> {
+        let knobs = &self.controller.config.knobs;
+        let most = knobs.jitter_ms;
+        let late_ms = knobs.latency_ms + if most > 0.0 { self.jitter.uniform(0.0, most) } else { 0.0 };
+        (late_ms > 0.0).then(|| Instant::now() + Duration::from_secs_f64(late_ms * 1e-3))
+    }
+
+    /// Tells every client something in words.
+    pub(super) fn tell(&self, message: &str, level: u8) {
+        for client in self.clients.values() {
+            let bytes = client.session.text(message, level);
+            client.outbox.put(Letter { bytes, due: None, fleeting: false, last: false });
+        }
+    }
+}

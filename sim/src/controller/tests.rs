@@ -1,0 +1,1 @@
+//! The controller without sockets, and with them.
