@@ -2,96 +2,50 @@
 //!
 //! Pressing force in, offset along the probe's z out (positive into the tissue), every output jerk-limited.
 //!
-//! The law is a speed for each newton that is missing, and an acceleration for each: `v = g e + h ∫e dt`, smoothed by
-//! one filter on the force and two on the speed. On a skin of stiffness `k` the loop is `k g (s + h/g) / s²` with a
-//! few lags (servo, two ticks, the filters: 43 ms at most). Two facts make one pair of gains do for skins that
-//! differ tenfold:
+//! The skin answers with `f = k (x - w)`: stiffness times how far the probe is in. The law reckons where the force would
+//! be the one to hold, `x + (f* - f) / k`, from where the probe was when the force was felt ([`arm_lag`]); tracks that
+//! place and its speed; and goes to where it will be when the command has arrived. So what stands still or moves
+//! steadily costs nothing, and whatever the arm's lag is, slow errors are integrated twice. The path's own shape is
+//! fed forward by being the path: the offset is beside it. Limits wind nothing up, for the place is reckoned from what
+//! was commanded in truth.
 //!
-//! - *Accuracy does not depend on `k`.* Slowly (below the crossover) the error is `k a / (k h) = a / h`, where `a` is
-//!   the acceleration of the skin under the probe: a bump of ±5 mm over 40 mm at 10 mm/s has 12 mm/s², which costs
-//!   0.2 N at its peak with `h` = 60 mm/s²/N.
-//! - *Stability needs only the stiffest.* With a servo lag of 16 ms the loop crosses at 22.8 rad/s on 3 N/mm, with
-//!   17° of phase and a factor of 1.6 of gain to spare (28° and 2.2 at 6 ms). Softer skin crosses lower, where the lags
-//!   cost less and the integral more: 29° on 1 N/mm, 20° on 0.3 N/mm, with a factor of 5 and more of gain.
-//!
-//! An estimate of the stiffness from the probe's own motion was tried and left out: under a skin that is followed
-//! well the force hardly changes while the probe moves, so the estimate falls to zero just when the loop works, and
-//! with enough excitation to be trusted (a loop that already oscillates) it came too late to help.
-//!
-//! On skin much stiffer than 4 N/mm (bone right under the probe) these gains oscillate, and the guard's force limit ends
-//! it; [`ContactSettings::for_stiffest`] trades accuracy for such places.
+//! Only the ratio of the true stiffness to the one reckoned with decides on stability, and everything below 1.4 is
+//! stable; so the stiffness is held on the stiff side, asked for all the time ([`stiffness`]), and when the law hands the
+//! skin more energy than it may, it is calmed down ([`tank`]). The argument and the numbers are in `docs/contact.md`.
 
+mod arm_lag;
 pub(crate) mod pressure;
+mod settings;
+mod stiffness;
+mod tank;
 mod touch_down;
 
 use probepath_frames::Span;
-use thiserror::Error;
 
 use crate::limits::axis::{self, Bounds, Motion};
+use arm_lag::ArmLag;
+pub use settings::{ContactError, ContactSettings};
+pub use stiffness::SkinEstimate;
+use stiffness::Stiffness;
+use tank::Tank;
 pub use touch_down::{TouchDown, TouchDownPhase, TouchDownSettings};
 
-/// What the contact law may do, and how it does it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ContactSettings {
-    /// Largest speed along the probe's z (m/s). 0.03.
-    pub speed_m_s: f64,
-    /// Largest acceleration along it (m/s²). 0.5.
-    pub acceleration_m_s2: f64,
-    /// Largest jerk along it (m/s³). 20.
-    pub jerk_m_s3: f64,
-    /// How far the offset may go against the path, out of the tissue (m, negative). -0.04.
-    pub lowest_m: f64,
-    /// How far the offset may go into the tissue (m); 5 N on skin of 0.3 N/mm is 17 mm. 0.04.
-    pub highest_m: f64,
-    /// Speed for each newton that is missing (m/s/N). 0.008.
-    pub gain: f64,
-    /// Acceleration for each newton that is missing (m/s²/N): follows a skin that rises steadily. 0.06.
-    pub integral_gain: f64,
-    /// Time constant of the filter on the force (s). 0.005.
-    pub filter_s: f64,
-    /// Angular frequency of the second-order filter on the speed (rad/s). 120.
-    pub smooth_rad_s: f64,
-}
+/// How the bandwidth falls with the stiffness that is reckoned with: softer skin makes less force of the same error in
+/// place, and more motion of the same noise.
+const SOFTER_IS_SLOWER: f64 = 0.4;
+/// On the skin (N): below, nothing is learned of it.
+const ON_SKIN_N: f64 = 0.4;
+/// Where the skin is asked for its stiffness, as a multiple of how fast it is followed: there the loop is a good quarter
+/// of a period late.
+const ASKED_ABOVE: f64 = 1.0;
+/// How much slower, and softer, the law is while the tank is empty.
+const CALM: f64 = 0.5;
 
-impl Default for ContactSettings {
-    fn default() -> Self {
-        Self {
-            speed_m_s: 0.03,
-            acceleration_m_s2: 0.5,
-            jerk_m_s3: 20.0,
-            lowest_m: -0.04,
-            highest_m: 0.04,
-            gain: 0.008,
-            integral_gain: 0.06,
-            filter_s: 0.005,
-            smooth_rad_s: 120.0,
-        }
-    }
-}
-
-/// The skin the default gains are made for (N/m): the stiffest of FIELD.md section 8.
-const STIFFEST: f64 = 3000.0;
-
-impl ContactSettings {
-    /// The default, with gains for another stiffest skin (N/m): stiffer is slower.
-    pub fn for_stiffest(stiffness_n_m: f64) -> Self {
-        let by = STIFFEST / stiffness_n_m;
-        let default = Self::default();
-        Self { gain: default.gain * by, integral_gain: default.integral_gain * by, ..default }
-    }
-}
-
-/// Settings that no contact can be held with.
-#[derive(Clone, Debug, Error, PartialEq)]
-#[error("the contact setting {what} is {value}; {wanted}")]
-pub struct ContactError {
-    /// Which setting.
-    pub what: &'static str,
-    /// The number found.
-    pub value: f64,
-    /// What it has to be.
-    pub wanted: &'static str,
-}
+/// How long the law stays slower after the jerk was at its limit (s), and how slow it may become.
+const EASED_FOR_S: f64 = 0.1;
+const EASED_LEAST: f64 = 0.3;
+/// Over how long what is asked of the jerk is smoothed (s).
+const DEMAND_S: f64 = 0.006;
 
 /// Force in, offset out.
 #[derive(Clone, Copy, Debug)]
@@ -101,10 +55,22 @@ pub struct ContactLaw {
     dt: f64,
     /// The offset and its differences, per tick.
     motion: Motion,
-    /// The filtered pressing force (N), once one has come.
+    arm: ArmLag,
+    /// Where the probe was when the last force was felt (m).
+    felt_at: f64,
+    /// The offset at which the force would be the set one (m), and how fast it moves (m/s).
+    goal: (f64, f64),
+    skin: Stiffness,
+    tank: Tank,
+    /// How far the question to the skin is (rad).
+    asking: f64,
+    /// How much slower the law is for the jerk's sake: 1 is not at all.
+    eased: f64,
+    /// The jerk asked for, as a multiple of what is allowed, smoothed.
+    demand: f64,
+    /// The last force that was a number (N), and the filtered one, once one has come.
+    raw: f64,
     force: Option<f64>,
-    /// The integral's share of the speed (m/s).
-    integral: f64,
 }
 
 impl ContactLaw {
@@ -114,24 +80,8 @@ impl ContactLaw {
     /// When a setting is not finite or has the wrong sign.
     pub fn new(settings: ContactSettings, period: Span) -> Result<Self, ContactError> {
         let dt = period.seconds();
+        let arm = settings.check(dt)?;
         let s = &settings;
-        let positive = [
-            ("speed", s.speed_m_s),
-            ("acceleration", s.acceleration_m_s2),
-            ("jerk", s.jerk_m_s3),
-            ("highest offset", s.highest_m),
-            ("lowest offset, negated", -s.lowest_m),
-            ("gain", s.gain),
-            ("integral gain", s.integral_gain),
-            ("filter", s.filter_s),
-            ("smoothing", s.smooth_rad_s),
-            ("period", dt),
-        ];
-        if let Some((what, value)) =
-            positive.into_iter().find(|(_, value)| !(value.is_finite() && *value > 0.0))
-        {
-            return Err(ContactError { what, value, wanted: "it must be positive and finite" });
-        }
         let bounds = Bounds {
             lower: s.lowest_m,
             upper: s.highest_m,
@@ -139,26 +89,47 @@ impl ContactLaw {
             acceleration: s.acceleration_m_s2 * dt * dt,
             jerk: s.jerk_m_s3 * dt * dt * dt,
         };
-        let motion = Motion { position: 0.0, velocity: 0.0, acceleration: 0.0 };
-        Ok(Self { settings, bounds, dt, motion, force: None, integral: 0.0 })
+        Ok(Self {
+            settings,
+            bounds,
+            dt,
+            motion: Motion { position: 0.0, velocity: 0.0, acceleration: 0.0 },
+            arm,
+            felt_at: 0.0,
+            goal: (0.0, 0.0),
+            skin: Stiffness::new(s.softest_n_m, s.stiffest_n_m, dt),
+            tank: Tank::full(),
+            asking: 0.0,
+            eased: 1.0,
+            demand: 0.0,
+            raw: 0.0,
+            force: None,
+        })
     }
 
     /// One tick: the pressing force (N, positive; minus the wrench's force along the probe's z) and the force to hold
     /// give the next offset (m). A force that is not finite counts as the one before.
     pub fn step(&mut self, pressing_n: f64, set_n: f64) -> f64 {
-        let missing = set_n - self.filtered(pressing_n);
-        let wanted = self.settings.gain * missing + self.integral;
-        self.follow(wanted);
-        self.integrate(missing, wanted);
+        let moved = self.feel(pressing_n);
+        let missing = set_n - self.raw;
+        // In the air nothing is given back, however far the probe goes.
+        if self.raw > ON_SKIN_N {
+            self.tank.account(missing, moved);
+        }
+        self.track(missing);
+        self.toward_goal();
+        self.arm.command(self.motion.position);
         self.motion.position
     }
 
     /// One tick at a given speed (m/s, positive into the tissue) instead of a force, as smoothly: the descent before
     /// contact, the lift after.
     pub fn step_at(&mut self, speed_m_s: f64, pressing_n: f64) -> f64 {
-        self.filtered(pressing_n);
-        self.integral = 0.0;
-        self.follow(speed_m_s);
+        self.feel(pressing_n);
+        self.tank = Tank::full();
+        self.at_speed(speed_m_s);
+        self.goal = (self.felt_at, 0.0);
+        self.arm.command(self.motion.position);
         self.motion.position
     }
 
@@ -177,43 +148,113 @@ impl ContactLaw {
         self.force.unwrap_or(0.0)
     }
 
+    /// What it knows of the skin's stiffness.
+    pub const fn skin(&self) -> SkinEstimate {
+        self.skin.estimate()
+    }
+
+    /// What is left of the energy that it may hand to the skin, 0 to 1; at 0 it goes slowly until some came back.
+    pub fn energy_left(&self) -> f64 {
+        self.tank.left()
+    }
+
     /// What it may do.
     pub const fn settings(&self) -> &ContactSettings {
         &self.settings
     }
 
-    fn filtered(&mut self, pressing_n: f64) -> f64 {
-        let before = self.force.unwrap_or(if pressing_n.is_finite() { pressing_n } else { 0.0 });
-        let share = self.dt / (self.settings.filter_s + self.dt);
-        let force = if pressing_n.is_finite() { before + share * (pressing_n - before) } else { before };
+    /// Takes in a force; how far the probe moved (m) from where the last was felt to where this was.
+    fn feel(&mut self, pressing_n: f64) -> f64 {
+        if pressing_n.is_finite() {
+            self.raw = pressing_n;
+        }
+        let before = self.force.unwrap_or(self.raw);
+        let force = before + self.dt / (self.settings.filter_s + self.dt) * (self.raw - before);
         self.force = Some(force);
-        force
+        let at = self.arm.felt_at();
+        let moved = at - self.felt_at;
+        self.felt_at = at;
+        if force > ON_SKIN_N {
+            self.skin.learn(at, self.raw, self.asked_at());
+        } else {
+            self.skin.forget();
+        }
+        moved
     }
 
-    /// Moves toward a speed, as a critically damped filter of second order does, within the bounds.
-    fn follow(&mut self, speed_m_s: f64) {
+    /// How much slower than on the stiffest skin.
+    fn slower(&self) -> f64 {
+        let calm = if self.tank.is_empty() { CALM } else { 1.0 };
+        calm * self.eased * (self.skin.now() / self.settings.stiffest_n_m).powf(SOFTER_IS_SLOWER)
+    }
+
+    /// Where the force would be the set one, and how fast that place moves: a tracker with two equal poles.
+    fn track(&mut self, missing: f64) {
+        let fade = (-self.settings.follow_rad_s * self.slower() * self.dt).exp();
+        let stiffness = if self.tank.is_empty() { self.skin.now() / CALM } else { self.skin.now() };
+        let seen = self.felt_at + missing / stiffness;
+        let (at, speed) = self.goal;
+        let foreseen = at + speed * self.dt;
+        let off = seen - foreseen;
+        self.goal = (foreseen + (1.0 - fade * fade) * off, speed + (1.0 - fade).powi(2) / self.dt * off);
+    }
+
+    /// To where the goal will be when the command has arrived, as a critically damped filter of second order goes that
+    /// knows the goal's speed; within the bounds.
+    fn toward_goal(&mut self) {
+        let (at, speed) = self.goal;
+        let to = at + speed * self.arm.late_s() + self.question();
+        let w = self.settings.smooth_rad_s * self.slower() * self.dt;
+        let m = &self.motion;
+        let (off, slow) = (to - m.position - m.velocity, speed * self.dt - m.velocity);
+        // Solved for the end of the tick, so that it is stable at any frequency.
+        let acceleration = (w * w * off + 2.0 * w * slow) / (1.0 + 2.0 * w + w * w);
+        let demand = (acceleration - m.acceleration) / self.bounds.jerk;
+        self.go(m.position + (m.velocity + acceleration));
+        self.ease(demand);
+    }
+
+    /// What the jerk's limit cuts off comes late, and a late answer rocks the loop. The same way in a third of the jerk
+    /// is one that is slower by the third root: the law becomes that much slower at once, and fast again within a while.
+    /// Noise asks for one sign as often as for the other, and does not count.
+    fn ease(&mut self, demand: f64) {
+        self.demand += self.dt / (DEMAND_S + self.dt) * (demand - self.demand);
+        let demand = self.demand.abs();
+        let risen = self.eased + (1.0 - self.eased) * self.dt / EASED_FOR_S;
+        self.eased = if demand > 1.0 { risen.min(demand.cbrt().recip().max(EASED_LEAST)) } else { risen };
+    }
+
+    /// The angular frequency of the question to the skin.
+    fn asked_at(&self) -> f64 {
+        ASKED_ABOVE * self.settings.follow_rad_s * self.slower()
+    }
+
+    /// A small motion to and fro, which asks the skin for its stiffness (m).
+    fn question(&mut self) -> f64 {
+        self.asking = (self.asking + self.asked_at() * self.dt) % std::f64::consts::TAU;
+        let size = (self.settings.question_n / self.skin.now()).max(self.settings.question_m);
+        size * self.asking.sin()
+    }
+
+    /// Moves toward a speed, as a critically damped filter of second order does.
+    fn at_speed(&mut self, speed_m_s: f64) {
         let w = self.settings.smooth_rad_s * self.dt;
         let speed = speed_m_s.clamp(-self.settings.speed_m_s, self.settings.speed_m_s) * self.dt;
         let m = &self.motion;
-        // Solved for the end of the tick, so that it is stable at any frequency.
         let acceleration = (m.acceleration + w * w * (speed - m.velocity)) / (1.0 + 2.0 * w + w * w);
-        let wanted = m.position + (m.velocity + acceleration);
+        self.go(m.position + (m.velocity + acceleration));
+    }
+
+    /// As near to a position as the bounds allow.
+    fn go(&mut self, wanted: f64) {
+        let m = &self.motion;
         let position = axis::limit(m, &self.bounds, wanted);
         let velocity = position - m.position;
         self.motion = Motion { position, velocity, acceleration: velocity - m.velocity };
     }
-
-    /// The integral stops where the speed or the offset is at its limit, unless it leads back.
-    fn integrate(&mut self, missing: f64, wanted: f64) {
-        let s = &self.settings;
-        let full = wanted.abs() >= s.speed_m_s
-            || (wanted > 0.0 && self.motion.position > s.highest_m - 1e-4)
-            || (wanted < 0.0 && self.motion.position < s.lowest_m + 1e-4);
-        if !full || missing * wanted < 0.0 {
-            self.integral += s.integral_gain * missing * self.dt;
-        }
-    }
 }
 
+#[cfg(test)]
+mod passive;
 #[cfg(test)]
 mod tests;

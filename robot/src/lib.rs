@@ -59,7 +59,9 @@ mod run;
 pub use arm::{Arm, ArmFault, Command, Controller, Safety, State};
 pub use black_box::BlackBox;
 pub use contact::pressure::{ContactWatch, Face, Pressure};
-pub use contact::{ContactError, ContactLaw, ContactSettings, TouchDown, TouchDownPhase, TouchDownSettings};
+pub use contact::{
+    ContactError, ContactLaw, ContactSettings, SkinEstimate, TouchDown, TouchDownPhase, TouchDownSettings,
+};
 pub use guard::{
     Ceiling, Guard, GuardLimits, Phase, Plane, ProbePlace, Trip, Verdict, Watch, Workspace, probe_place,
 };

@@ -167,13 +167,15 @@ impl Replay {
 
     /// Along the path, the force held.
     fn follow(&mut self, state: &State, cap: f64, yielding: bool, pause: bool) -> Option<Joints> {
-        self.law.step(self.pressing(state), self.settings.force_n);
+        let set_n = if yielding { self.settings.yielding_n() } else { self.settings.force_n };
+        self.law.step(self.pressing(state), set_n);
         let force = self.law.force_n();
         let soft = self.settings.soft_limit_n;
         let yielding = force > soft || (yielding && force > 0.5 * (soft + self.settings.force_n));
         let waits = pause || yielding;
         let cap = if waits { self.settings.resume_speed } else { self.risen(cap) };
-        let speed = if waits { 0.0 } else { self.plan.settings.speed.speed.min(cap) };
+        let speed =
+            if waits { 0.0 } else { self.plan.settings.speed.speed.min(cap) * self.settings.eased(force) };
         let s = self.clock.step(speed, self.dt);
         self.stage = if self.touch.is_lost(force, self.settings.lost_below_n) {
             Stage::Lift { ending: ReplayEnding::ContactLost { at_m: s } }

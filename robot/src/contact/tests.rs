@@ -8,8 +8,6 @@ use super::*;
 
 const PERIOD: Span = Span::from_milliseconds(2);
 const DT: f64 = 0.002;
-/// The path's speed (m/s).
-const SPEED: f64 = 0.01;
 const WANTED: f64 = 5.0;
 
 fn between(rng: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
@@ -26,6 +24,40 @@ struct Skin {
     waves: [(f64, f64, f64); 2],
     stiffness: Vec<f64>,
     knot: f64,
+    /// The path's speed over it (m/s).
+    speed: f64,
+    disturbance: Disturbance,
+}
+
+/// What is done to the skin beside its own shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Disturbance {
+    None,
+    /// 5 mm to either side, every 4 s.
+    Breathing,
+    /// Up by 10 mm within 0.5 s, and down again.
+    Moves,
+    /// 5 mm high, 10 mm long.
+    Bump,
+}
+
+impl Disturbance {
+    /// How far the skin is lifted (m).
+    fn at(self, x: f64, t: f64) -> f64 {
+        let risen = |from: f64| {
+            let s = ((t - from) / 0.5).clamp(0.0, 1.0);
+            s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
+        };
+        match self {
+            Self::None => 0.0,
+            Self::Breathing => 0.005 * (std::f64::consts::TAU * 0.25 * t).sin(),
+            Self::Moves => 0.010 * (risen(6.0) - risen(9.0)),
+            Self::Bump if (x - 0.06).abs() < 0.005 => {
+                0.0025 * (1.0 + ((x - 0.06) * std::f64::consts::TAU / 0.01).cos())
+            }
+            Self::Bump => 0.0,
+        }
+    }
 }
 
 impl Skin {
@@ -34,7 +66,8 @@ impl Skin {
         let waves = [height * share, height * (1.0 - share)]
             .map(|height| (height, between(rng, 0.04, 0.1), between(rng, 0.0, std::f64::consts::TAU)));
         let stiffness = (0..20).map(|_| 300.0 * 10f64.powf(between(rng, 0.0, 1.0))).collect();
-        Self { waves, stiffness, knot: between(rng, 0.03, 0.06) }
+        let knot = between(rng, 0.03, 0.06);
+        Self { waves, stiffness, knot, speed: 0.010, disturbance: Disturbance::None }
     }
 
     fn height(&self, x: f64) -> f64 {
@@ -79,17 +112,35 @@ impl Plant {
     }
 }
 
+#[derive(Debug)]
 struct Held {
     rms: f64,
     overshoot: f64,
+    most: f64,
     largest_jerk: f64,
 }
 
 /// Touches down, then follows 150 mm of a random skin.
-fn scan(seed: u64) -> Held {
+fn scan(seed: u64, speed: f64, disturbance: Disturbance) -> Held {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let skin = Skin::new(&mut rng);
+    let skin = Skin { speed, disturbance, ..Skin::new(&mut rng) };
     hold(&skin, Plant::new(rng))
+}
+
+/// The worst of many seeds, and the mean RMS.
+fn worst(seeds: u64, speed: f64, disturbance: Disturbance) -> (Held, f64) {
+    let mut worst = Held { rms: 0.0, overshoot: 0.0, most: 0.0, largest_jerk: 0.0 };
+    let mut sum = 0.0;
+    for seed in 0..seeds {
+        let held = scan(seed, speed, disturbance);
+        sum += held.rms;
+        worst.rms = worst.rms.max(held.rms);
+        worst.overshoot = worst.overshoot.max(held.overshoot);
+        worst.most = worst.most.max(held.most);
+        worst.largest_jerk = worst.largest_jerk.max(held.largest_jerk);
+    }
+    println!("{disturbance:?} at {speed} m/s: mean {:.3} N RMS, {worst:?}", sum / seeds as f64);
+    (worst, sum / seeds as f64)
 }
 
 fn hold(skin: &Skin, mut plant: Plant) -> Held {
@@ -97,16 +148,18 @@ fn hold(skin: &Skin, mut plant: Plant) -> Held {
     let mut down = TouchDown::new(law, TouchDownSettings::default(), WANTED, PERIOD).unwrap();
     let gap = 0.005;
     let (mut x, mut force, mut squares, mut count) = (0.0, 0.0, 0.0, 0.0);
-    let mut held = Held { rms: 0.0, overshoot: 0.0, largest_jerk: 0.0 };
+    let mut held = Held { rms: 0.0, overshoot: 0.0, most: 0.0, largest_jerk: 0.0 };
     let mut offsets = [0.0; 4];
     for tick in 0..10_000 {
         let measured = plant.measured(force);
         let offset = down.step(measured);
         plant.follow(offset);
-        let surface = gap + skin.height(x) - skin.height(0.0);
+        let lifted = skin.disturbance.at(x, f64::from(tick) * DT);
+        let surface = gap + skin.height(x) - skin.height(0.0) - lifted;
         force = (skin.stiffness(x) * (plant.at - surface)).max(0.0);
         if down.phase() == TouchDownPhase::Held {
-            x += SPEED * DT;
+            x += skin.speed * DT;
+            held.most = held.most.max(force);
             squares += (force - WANTED).powi(2);
             count += 1.0;
         } else {
@@ -125,16 +178,25 @@ fn hold(skin: &Skin, mut plant: Plant) -> Held {
 }
 
 #[test]
-fn a_thousand_skins_are_held_within_three_tenths_of_a_newton_and_touched_within_one() {
-    let all: Vec<Held> = (0..1000).map(scan).collect();
-    let worst = all.iter().map(|held| held.rms).fold(0.0, f64::max);
-    let overshoot = all.iter().map(|held| held.overshoot).fold(0.0, f64::max);
-    let jerk = all.iter().map(|held| held.largest_jerk).fold(0.0, f64::max);
-    let mean = all.iter().map(|held| held.rms).sum::<f64>() / all.len() as f64;
-    println!("rms mean {mean:.3} worst {worst:.3} N, overshoot {overshoot:.3} N, jerk {jerk:.2} m/s³");
-    assert!(worst <= 0.3, "{worst} N RMS");
-    assert!(overshoot <= 1.0, "{overshoot} N over");
-    assert!(jerk <= ContactSettings::default().jerk_m_s3 * (1.0 + 1e-6), "{jerk} m/s³");
+fn a_thousand_skins_are_held_within_a_tenth_of_a_newton_and_touched_within_half_of_one() {
+    for (speed, rms) in [(0.010, 0.12), (0.020, 0.28)] {
+        let (worst, mean) = worst(500, speed, Disturbance::None);
+        assert!(mean <= 0.1, "{mean} N RMS");
+        assert!(worst.rms <= rms, "{} N RMS", worst.rms);
+        assert!(worst.overshoot <= 0.5, "{} N over", worst.overshoot);
+        let jerk = ContactSettings::default().jerk_m_s3;
+        assert!(worst.largest_jerk <= jerk * (1.0 + 1e-6), "{} m/s³", worst.largest_jerk);
+    }
+}
+
+#[test]
+fn breathing_a_leg_that_moves_and_a_bump_never_press_more_than_ten_newtons() {
+    for disturbance in [Disturbance::Breathing, Disturbance::Moves, Disturbance::Bump] {
+        for speed in [0.010, 0.020] {
+            let (worst, mean) = worst(60, speed, disturbance);
+            assert!(worst.most <= 10.0 && mean <= 0.55, "{worst:?} {mean}");
+        }
+    }
 }
 
 #[test]
@@ -196,10 +258,29 @@ fn no_skin_is_said_and_not_searched_for_ever() {
 
 #[test]
 fn settings_and_forces_that_are_no_numbers_are_refused_or_ignored() {
-    let bad = ContactSettings { gain: f64::NAN, ..ContactSettings::default() };
-    assert_eq!(ContactLaw::new(bad, PERIOD).unwrap_err().what, "gain");
+    let bad = ContactSettings { follow_rad_s: f64::NAN, ..ContactSettings::default() };
+    assert_eq!(ContactLaw::new(bad, PERIOD).unwrap_err().what, "following");
     let mut law = ContactLaw::new(ContactSettings::default(), PERIOD).unwrap();
     law.step(WANTED, WANTED);
     assert!(law.step(f64::NAN, WANTED).is_finite());
     assert!((law.force_n() - WANTED).abs() < 1e-9);
+}
+
+#[test]
+fn little_jerk_makes_it_slower_and_never_lets_it_bounce() {
+    for jerk_m_s3 in [8.0, 10.0, 20.0] {
+        let settings = ContactSettings { jerk_m_s3, acceleration_m_s2: 0.5, ..ContactSettings::default() };
+        let law = ContactLaw::new(settings, PERIOD).unwrap();
+        let mut down = TouchDown::new(law, TouchDownSettings::default(), WANTED, PERIOD).unwrap();
+        let mut plant = Plant::new(ChaCha8Rng::seed_from_u64(1));
+        let (mut force, mut touched) = (0.0, false);
+        for _ in 0..2500 {
+            let measured = plant.measured(force);
+            plant.follow(down.step(measured));
+            force = (3000.0 * (plant.at - 0.003)).max(0.0);
+            touched |= force > 0.8;
+            assert!(!touched || (0.2..5.5).contains(&force), "{force} N with {jerk_m_s3} m/s³");
+        }
+        assert_eq!(down.phase(), TouchDownPhase::Held);
+    }
 }
