@@ -1,39 +1,63 @@
-//! The guard: the supervisor of every motion.
+//! The guard: the supervisor of every motion, after every source of commands.
 //!
 //! ```text
-//!             begin(): the arm is at rest, its state fit           trip
+//!             begin(): the arm is at rest, its state fit           trip, the operator's stop, a fault
 //!   ┌───────┐ ──────────────────────────────────▶ ┌─────────┐ ───────────▶ ┌──────────┐
 //!   │ Armed │                                     │ Running │              │ Stopping │
 //!   └───────┘ ◀────────────────────────────────── └─────────┘              └──────────┘
-//!       ▲       end(): the motion ended in peace                                │ end(): at rest, or lost
+//!       ▲       end(): the motion was done                                      │ end(): at rest, or lost
 //!       │                                                                       ▼
-//!       │  confirm(fresh state): fit, the force below the soft limit       ┌─────────┐
-//!       └───────────────────────────────────────────────────────────────── │ Stopped │
-//!          confirm_to_lift(fresh state): fit but for the force, which      └─────────┘
-//!          may then only fall
+//!       │  confirm(fresh state): at rest, fit, the force below the        ┌─────────┐
+//!       └──────────────────────────────────────────────────────────────── │ Stopped │
+//!          soft limit; the probe is slow at first: 10 mm/s, and e times   └─────────┘
+//!          more every second of motion
+//!          confirm_to_lift(fresh state): at rest, fit but for the force,
+//!          which may then only fall
 //! ```
 //!
-//! Every tick [`Guard::judge`] looks at the command and the state that came back, without side effects, then steps.
+//! Every tick [`Guard::judge_command`] looks at the command, after the limits and before it is sent, and
+//! [`Guard::judge`] at the state that came back; both look first, without side effects, and then step.
+//!
+//! | of the command | of the state |
+//! |---|---|
+//! | changed by the limits: joints' position, velocity, acceleration, jerk | late tick, old data, back in time, frozen sensor |
+//! | the probe's speed: in the air, on the skin, after a confirmation, in reduced mode | the arm's own safety system |
+//! | the workspace and the probe's tilt, where a brake would end | joints' range, velocity, lag, jumps |
+//! |  | implausible wrench, force, sideways force, pressure |
+//!
+//! While the arm gives way to the hand by its own means ([`Command::Freedrive`](crate::Command::Freedrive)) there is no
+//! command to judge: the probe's measured place and speed are judged instead.
 
+mod confirm;
 mod judge;
 mod limits;
+mod remember;
+mod tilt;
 mod trip;
 mod workspace;
 
-use probepath_frames::{Base, Flange, Point, Pose, Probe};
+use probepath_frames::{Base, Flange, Pose, Probe, Span, Stamp};
 
-use crate::{Asked, BlackBox, Joints, Limited, LimitsError, Model, MotionLimits, Operator, State, Tick};
+use crate::{
+    Asked, BlackBox, ContactWatch, Face, Joints, Limited, LimitsError, Model, MotionLimits, Operator, State,
+    Tick,
+};
 pub use limits::GuardLimits;
+pub use remember::{Allowance, Watch};
+pub use tilt::Tilt;
 pub use trip::Trip;
 pub use workspace::{Plane, Workspace};
 
-/// Where the probe's origin is, given the joints: the model's forward kinematics with the tool on.
-pub type ProbePlace = Box<dyn Fn(&Joints) -> Point<Base> + Send>;
+/// Where the probe is, given the joints: the model's forward kinematics with the tool on.
+pub type ProbePlace = Box<dyn Fn(&Joints) -> Pose<Base, Probe> + Send>;
 
-/// Where a model's forward kinematics puts the probe's origin.
+/// Where a model's forward kinematics puts the probe.
 pub fn probe_place(model: Model, flange_from_probe: Pose<Flange, Probe>) -> ProbePlace {
-    Box::new(move |joints| model.forward(joints) * flange_from_probe.origin())
+    Box::new(move |joints| model.forward(joints) * flange_from_probe)
 }
+
+/// A pressure counts when it lasts: a single tick's torque is too noisy to say where the force acts.
+const PRESSED_FOR: Span = Span::from_milliseconds(50);
 
 /// What the guard makes of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,7 +78,7 @@ pub enum Verdict {
 )]
 pub enum Phase {
     /// A motion may begin.
-    Armed(Ceiling),
+    Armed(Allowance),
     /// A motion runs.
     Running(Watch),
     /// The arm brakes.
@@ -63,32 +87,18 @@ pub enum Phase {
     Stopped(Trip),
 }
 
-/// The largest force (N) that is tolerated now: the hard limit, or more while the probe is lifted out of too much
-/// force; it follows the force down and never rises.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ceiling(f64);
-
-/// What the guard remembers of a running motion.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Watch {
-    ceiling: Ceiling,
-    last: State,
-    probe: Option<Point<Base>>,
-    /// Nanoseconds since the state was last new.
-    stale_ns: i64,
-}
-
-/// How much more force (N) than now is tolerated while lifting out of too much of it: noise and the skin's rebound.
-const WHILE_LIFTING: f64 = 1.0;
-
 /// The supervisor. See the [module](self) for its diagram.
 pub struct Guard {
     limits: GuardLimits,
     motion: MotionLimits,
     workspace: Workspace,
+    tilt: Option<Tilt>,
+    face: Option<Face>,
     probe: Option<ProbePlace>,
     operator: Operator,
     phase: Phase,
+    /// The last state of a motion that was stopped: a confirmation needs a newer one.
+    stopped_at: Option<Stamp>,
     black_box: BlackBox,
 }
 
@@ -99,10 +109,18 @@ impl Guard {
     /// When the limits cannot be kept.
     pub fn new(limits: GuardLimits, motion: MotionLimits) -> Result<Self, LimitsError> {
         motion.check()?;
-        let phase = Phase::Armed(Ceiling(limits.force_hard_n));
-        let workspace = Workspace::default();
-        let (operator, black_box) = (Operator::new(), BlackBox::default());
-        Ok(Self { limits, motion, workspace, probe: None, operator, phase, black_box })
+        Ok(Self {
+            limits,
+            motion,
+            workspace: Workspace::default(),
+            tilt: None,
+            face: None,
+            probe: None,
+            operator: Operator::new(),
+            phase: Phase::Armed(Allowance::usual(&limits)),
+            stopped_at: None,
+            black_box: BlackBox::default(),
+        })
     }
 
     /// Also watches where the probe is and how fast it moves.
@@ -110,6 +128,20 @@ impl Guard {
     pub fn within(mut self, workspace: Workspace, probe: ProbePlace) -> Self {
         self.workspace = workspace;
         self.probe = Some(probe);
+        self
+    }
+
+    /// Also watches how far the probe leans over; needs the probe's place, given by [`within`](Self::within).
+    #[must_use]
+    pub const fn leaning_at_most(mut self, tilt: Tilt) -> Self {
+        self.tilt = Some(tilt);
+        self
+    }
+
+    /// Also watches how the force spreads over the probe's face, and how much of it drags along the skin.
+    #[must_use]
+    pub const fn pressing_with(mut self, face: Face) -> Self {
+        self.face = Some(face);
         self
     }
 
@@ -130,12 +162,10 @@ impl Guard {
         &self.limits
     }
 
-    /// Other limits from the next motion on: hand guiding and scanning differ. A confirmation to lift stays one.
-    pub fn set_limits(&mut self, limits: GuardLimits) {
-        if let Phase::Armed(ceiling) = &mut self.phase
-            && ceiling.0 <= self.limits.force_hard_n
-        {
-            *ceiling = Ceiling(limits.force_hard_n);
+    /// Other limits from the next motion on: hand guiding and scanning differ. What a confirmation allowed stays.
+    pub const fn set_limits(&mut self, limits: GuardLimits) {
+        if let Phase::Armed(allowance) = &mut self.phase {
+            allowance.change(&self.limits, &limits);
         }
         self.limits = limits;
     }
@@ -160,42 +190,16 @@ impl Guard {
         self.operator.wish() == Asked::Stop
     }
 
-    /// A fresh confirmation after a stop, from a state that was just measured.
-    ///
-    /// # Errors
-    /// When the state is not fit to move from, the skin still presses harder than the soft limit (lift first), or it
-    /// is no newer than the one that tripped.
-    pub fn confirm(&mut self, fresh: &State) -> Result<(), Trip> {
-        let force_n = fresh.wrench.force.norm();
-        if force_n > self.limits.force_soft_n {
-            return Err(Trip::Force { force_n, limit_n: self.limits.force_soft_n });
-        }
-        self.fit(fresh)?;
-        self.phase = Phase::Armed(Ceiling(self.limits.force_hard_n));
-        Ok(())
-    }
-
-    /// A fresh confirmation to lift the probe out of too much force: as [`confirm`](Self::confirm), but the force may
-    /// still be high. It may only fall from here: the tolerance follows it down.
-    ///
-    /// # Errors
-    /// When the state is not fit to move from for another reason.
-    pub fn confirm_to_lift(&mut self, fresh: &State) -> Result<(), Trip> {
-        self.fit(fresh)?;
-        let force = fresh.wrench.force.norm();
-        self.phase = Phase::Armed(Ceiling(self.limits.force_hard_n.max(force + WHILE_LIFTING)));
-        Ok(())
-    }
-
     /// A motion begins, from rest and a fit state.
-    pub(crate) fn begin(&mut self, state: &State) -> Result<(), Trip> {
-        let Phase::Armed(ceiling) = self.phase else {
+    pub(crate) fn begin(&mut self, state: &State, period: Span) -> Result<(), Trip> {
+        let Phase::Armed(allowance) = self.phase else {
             return Err(Trip::NotConfirmed);
         };
         self.fit(state)?;
         self.black_box.clear();
         let probe = self.probe.as_ref().map(|place| place(&state.commanded));
-        self.phase = Phase::Running(Watch { ceiling, last: *state, probe, stale_ns: 0 });
+        let contact = self.face.map(|face| ContactWatch::new(face, PRESSED_FOR, period));
+        self.phase = Phase::Running(Watch::new(allowance, state, probe, contact));
         Ok(())
     }
 
@@ -208,40 +212,51 @@ impl Guard {
         dt: f64,
     ) -> Verdict {
         let Limited { changed, joint, position } = *limited;
+        let Phase::Running(mut watch) = self.phase else {
+            return Verdict::Stop(Trip::NotConfirmed);
+        };
         let found = if changed > self.limits.correction {
             Some(Trip::Corrected { joint, by: changed })
         } else {
-            self.judge_place(&position, brakes_at, dt)
+            self.judge_place(&mut watch, &position, brakes_at, dt)
         };
+        self.phase = Phase::Running(watch);
         self.settle(found, None)
     }
 
-    /// One tick: what to make of the state that came back.
-    pub(crate) fn judge(&mut self, state: &State, dt: f64) -> Verdict {
-        let Phase::Running(watch) = self.phase else {
+    /// The probe was told to be there without a question: on the way to rest, or by the hand.
+    pub(crate) fn moved_to(&mut self, position: &Joints) {
+        if let (Phase::Running(watch), Some(place)) = (&mut self.phase, &self.probe) {
+            watch.probe = Some(place(position));
+        }
+    }
+
+    /// One tick: what to make of the state that came back; `free` when the arm gives way to the hand by its own means.
+    pub(crate) fn judge(&mut self, state: &State, dt: f64, free: bool) -> Verdict {
+        let Phase::Running(mut watch) = self.phase else {
             return Verdict::Stop(Trip::NotConfirmed);
         };
-        let stale_ns = if state.tick == watch.last.tick || state.stamp <= watch.last.stamp {
-            watch.stale_ns + (dt * 1e9) as i64
-        } else {
-            0
-        };
-        let force = state.wrench.force.norm();
-        let found =
-            self.late(&watch.last, state, stale_ns).err().or_else(|| self.unfit(state)).or_else(|| {
-                self.jumped(&watch.last, state, dt).or((force > watch.ceiling.0)
-                    .then_some(Trip::Force { force_n: force, limit_n: watch.ceiling.0 }))
-            });
-        let ceiling = Ceiling(self.limits.force_hard_n.max(watch.ceiling.0.min(force + WHILE_LIFTING)));
-        self.phase = Phase::Running(Watch { ceiling, last: *state, stale_ns, ..watch });
-        self.settle(found, Some(force))
+        let last = watch.last;
+        watch.see(state, dt, &self.limits);
+        let found = self
+            .late(&last, state, watch.stale_ns)
+            .or_else(|| self.frozen(&watch, dt))
+            .or_else(|| self.unfit(state))
+            .or_else(|| self.jumped(&last, state, dt))
+            .or_else(|| self.too_much(&watch, state))
+            .or_else(|| if free { self.judge_free(&mut watch, state, dt) } else { None });
+        self.phase = Phase::Running(watch);
+        self.settle(found, Some(state.wrench.force.norm()))
     }
 
     /// The motion ended: at rest, or the arm is lost.
-    pub(crate) fn end(&mut self) {
+    pub(crate) fn end(&mut self, last: &State) {
         self.phase = match self.phase {
-            Phase::Running(watch) => Phase::Armed(watch.ceiling),
-            Phase::Stopping(trip) => Phase::Stopped(trip),
+            Phase::Running(watch) => Phase::Armed(watch.allowance),
+            Phase::Stopping(trip) => {
+                self.stopped_at = Some(last.stamp);
+                Phase::Stopped(trip)
+            }
             other => other,
         };
     }
@@ -255,8 +270,9 @@ impl Guard {
         std::mem::take(&mut self.black_box)
     }
 
-    /// Something outside the guard went wrong (the arm's fault, a panic): a fresh confirmation is needed too.
-    pub(crate) fn stop(&mut self, trip: Trip) {
+    /// Something outside the guard ended the motion (the operator, the arm's fault, a panic): a fresh confirmation is
+    /// needed too.
+    pub(crate) const fn stop(&mut self, trip: Trip) {
         if !matches!(self.phase, Phase::Stopped(_) | Phase::Stopping(_)) {
             self.phase = Phase::Stopping(trip);
         }
@@ -273,3 +289,6 @@ impl Guard {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -63,7 +63,8 @@ pub use contact::{
     ContactError, ContactLaw, ContactSettings, SkinEstimate, TouchDown, TouchDownPhase, TouchDownSettings,
 };
 pub use guard::{
-    Ceiling, Guard, GuardLimits, Phase, Plane, ProbePlace, Trip, Verdict, Watch, Workspace, probe_place,
+    Allowance, Guard, GuardLimits, Phase, Plane, ProbePlace, Tilt, Trip, Verdict, Watch, Workspace,
+    probe_place,
 };
 pub use joints::{Joints, MAX_JOINTS, WrongJoints};
 pub use limits::{Limited, Limiter, LimitsError, MotionLimits};

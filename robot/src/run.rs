@@ -78,6 +78,15 @@ impl StopReason {
     pub const fn asks_to_lift(&self) -> bool {
         matches!(self, Self::Guard(trip) if trip.asks_to_lift())
     }
+
+    /// Whether the arm stopped by its own means, or cannot be reached.
+    pub const fn is_of_the_arm(&self) -> bool {
+        match self {
+            Self::Arm(_) => true,
+            Self::Guard(trip) => trip.is_of_the_arm(),
+            _ => false,
+        }
+    }
 }
 
 /// How many ticks an arm gets to come to rest before a motion begins.
@@ -88,10 +97,13 @@ const TICKS_TO_REST: u64 = 5000;
 /// then told to stay; an arm that does not answer is told to stay, and brakes by its own means.
 ///
 /// After the controller come the limits with the last word, then the guard; see [`Limiter`] and [`Guard`].
+/// [`Command::Freedrive`] goes to the arm from rest only; when the controller wants something else again, the arm is
+/// told to stay until it rests where the hand left it, and the limits start from there.
 ///
 /// # Errors
-/// When the guard trips, the arm fails, a command is not finite, or the controller or observer panics; the error
-/// carries the last ticks. After an error the guard wants a fresh confirmation.
+/// When the guard trips, the arm fails or stops by itself, a command is not finite, or the controller or observer
+/// panics; the error carries the last ticks. After any ending but the controller's own the guard wants a fresh
+/// confirmation.
 pub fn run(
     arm: &mut dyn Arm,
     controller: &mut dyn Controller,
@@ -119,6 +131,8 @@ struct Motion<'a> {
     ticks: u64,
     /// Whether the observer may still be asked: after a panic it is left alone.
     observer_well: bool,
+    /// Whether the arm gives way to the hand by its own means.
+    free: bool,
 }
 
 impl<'a> Motion<'a> {
@@ -130,14 +144,16 @@ impl<'a> Motion<'a> {
         let refused = |reason, last| RunError { reason, last, at_rest: true, black_box: BlackBox::new(1) };
         let rested = rest(arm, observer).map_err(|reason| Box::new(refused(reason, None)))?;
         let state = rested.state;
-        guard.begin(&state).map_err(|trip| Box::new(refused(StopReason::Guard(trip), Some(state))))?;
+        guard
+            .begin(&state, arm.period())
+            .map_err(|trip| Box::new(refused(StopReason::Guard(trip), Some(state))))?;
         let (dt, limits) = (arm.period().seconds(), *guard.motion_limits());
         let limiter = Limiter::at_rest(limits, arm.period(), state.commanded).map_err(|error| {
-            guard.end();
+            guard.end(&state);
             Box::new(refused(StopReason::Limits(error), Some(state)))
         })?;
         let Rested { wish, ticks, .. } = rested;
-        Ok(Self { arm, guard, observer, limiter, state, wish, dt, ticks, observer_well: true })
+        Ok(Self { arm, guard, observer, limiter, state, wish, dt, ticks, observer_well: true, free: false })
     }
 
     /// The loop.
@@ -152,15 +168,67 @@ impl<'a> Motion<'a> {
             let Some(wanted) = caught("controller", || controller.step(&self.state))? else {
                 return Ok(Ending::Done);
             };
-            let (command, changed) = self.limited(&wanted)?;
-            self.wish = self.exchange(wanted, command, changed, false)?;
+            self.wish = match (self.free, wanted) {
+                (_, Command::Freedrive) => self.give_way()?,
+                // What was wanted comes from before the arm was at rest: the controller is asked again.
+                (true, _) => self.take_hold()?,
+                _ => {
+                    let (command, changed) = self.limited(&wanted)?;
+                    self.exchange(wanted, command, changed, false)?
+                }
+            };
         }
+    }
+
+    /// One tick of giving way to the hand by the arm's own means; from rest only.
+    fn give_way(&mut self) -> Result<Wish, StopReason> {
+        if !self.free && !self.limiter.is_at_rest() {
+            let command = self.slowing();
+            return self.exchange(Command::Freedrive, command, 0.0, false);
+        }
+        if !self.free {
+            self.guard.moved_to(&self.state.position);
+            self.free = true;
+        }
+        self.exchange(Command::Freedrive, Command::Freedrive, 0.0, false)
+    }
+
+    /// The arm stops giving way: it stays until it is at rest where the hand left it, and the limits start from there.
+    fn take_hold(&mut self) -> Result<Wish, StopReason> {
+        let wish = self.stay_until_rest(false)?;
+        let (limits, rests_at) = (*self.limiter.limits(), self.state.commanded);
+        self.limiter = Limiter::at_rest(limits, self.arm.period(), rests_at).map_err(StopReason::Limits)?;
+        self.guard.moved_to(&rests_at);
+        self.free = false;
+        Ok(wish)
+    }
+
+    fn stay_until_rest(&mut self, braking: bool) -> Result<Wish, StopReason> {
+        let (mut before, mut same, mut asked) = (self.state.commanded, 0, Wish::GoOn);
+        for _ in 0..TICKS_TO_REST {
+            if let stop @ Wish::Stop(_) = self.exchange(Command::Stay, Command::Stay, 0.0, braking)? {
+                asked = stop;
+            }
+            same = if before == self.state.commanded { same + 1 } else { 0 };
+            before = self.state.commanded;
+            if same == 2 {
+                return Ok(asked);
+            }
+        }
+        Err(StopReason::Restless)
+    }
+
+    /// One tick of the limits' own brake, in the middle of a motion.
+    fn slowing(&mut self) -> Command {
+        let next = self.limiter.brake();
+        self.guard.moved_to(&next);
+        Command::Position(next)
     }
 
     /// The command after the limits and the guard.
     fn limited(&mut self, wanted: &Command) -> Result<(Command, f64), StopReason> {
         let Command::Position(position) = wanted else {
-            return Ok((Command::Position(self.limiter.brake()), 0.0));
+            return Ok((self.slowing(), 0.0));
         };
         let before = self.limiter;
         let limited = self.limiter.limit(position).map_err(StopReason::Limits)?;
@@ -184,7 +252,8 @@ impl<'a> Motion<'a> {
         braking: bool,
     ) -> Result<Wish, StopReason> {
         self.state = self.arm.exchange(&command).map_err(StopReason::Arm)?;
-        let verdict = if braking { Verdict::Fine } else { self.guard.judge(&self.state, self.dt) };
+        let free = self.free;
+        let verdict = if braking { Verdict::Fine } else { self.guard.judge(&self.state, self.dt, free) };
         let tick = Tick { index: self.ticks, wanted, command, changed, state: self.state, verdict, braking };
         self.ticks += 1;
         self.guard.remember(&tick);
@@ -206,23 +275,17 @@ impl<'a> Motion<'a> {
 
     /// Brakes, tells the arm to stay, and says how it went.
     fn end(mut self, left: Left) -> Result<Finished, Box<RunError>> {
-        let braked = match &left {
-            Err(StopReason::Arm(_)) => Ok(()),
-            _ => self.brake(),
-        };
-        let at_rest = braked.is_ok() && self.limiter.is_at_rest() && !matches!(left, Err(StopReason::Arm(_)));
+        let itself = left.as_ref().is_err_and(StopReason::is_of_the_arm);
+        let braked = if itself { Ok(()) } else { self.brake() };
+        let at_rest = braked.is_ok() && !itself;
         // The last word, also to an arm that did not answer: it may hear without being able to speak.
         let stayed = self.stay();
         let reason = match (left, braked, stayed) {
-            (Err(reason), _, _) | (Ok(_), Err(reason), _) => reason,
-            (Ok(ending), Ok(()), Ok(())) => {
-                self.guard.end();
-                return Ok(Finished { ending, ticks: self.ticks, last: self.state });
-            }
-            (Ok(_), Ok(()), Err(reason)) => reason,
+            (Err(reason), _, _) | (Ok(_), Err(reason), _) | (Ok(_), Ok(()), Err(reason)) => reason,
+            (Ok(ending), Ok(()), Ok(())) => return Ok(self.in_peace(ending)),
         };
         self.guard.stop(if let StopReason::Guard(trip) = reason { trip } else { Trip::Fault });
-        self.guard.end();
+        self.guard.end(&self.state);
         Err(Box::new(RunError {
             reason,
             last: Some(self.state),
@@ -231,8 +294,22 @@ impl<'a> Motion<'a> {
         }))
     }
 
+    /// A motion that was done leaves the guard armed; one that somebody stopped wants a fresh confirmation.
+    fn in_peace(self, ending: Ending) -> Finished {
+        match ending {
+            Ending::Done => {}
+            Ending::Operator => self.guard.stop(Trip::Operator),
+            Ending::Observer(_) => self.guard.stop(Trip::Watcher),
+        }
+        self.guard.end(&self.state);
+        Finished { ending, ticks: self.ticks, last: self.state }
+    }
+
     /// To rest, as hard as the limits allow. The observer is told, and can no longer ask for anything.
     fn brake(&mut self) -> Result<(), StopReason> {
+        if self.free {
+            return answered(self.stay_until_rest(true));
+        }
         while !self.limiter.is_at_rest() {
             let command = Command::Position(self.limiter.brake());
             answered(self.exchange(command, command, 0.0, true))?;
@@ -292,5 +369,8 @@ pub(crate) fn message(panic: &(dyn Any + Send)) -> String {
     text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("without words").into()
 }
 
+#[cfg(test)]
+#[cfg(test)]
+pub(crate) mod test_arm;
 #[cfg(test)]
 mod tests;

@@ -42,6 +42,8 @@ impl Arm for Ideal {
         }
         state.tick += 1;
         state.stamp = state.stamp + PERIOD;
+        // Every sensor has noise; one without is taken for one that hangs.
+        state.wrench.force.x = 0.1 + 1e-3 * (state.tick % 5) as f64;
         Ok(*state)
     }
 
@@ -73,6 +75,8 @@ fn guard(model: &Model) -> Guard {
     Guard::new(guard_limits, limits(model))
         .unwrap()
         .within(Workspace::new().and(table), probe_place(model.clone(), flange_from_probe))
+        .leaning_at_most(Tilt { upright: Direction::z(), most_rad: std::f64::consts::PI })
+        .pressing_with(Face::default())
         .listening_to(Operator::new())
 }
 

@@ -6,7 +6,9 @@ mod status;
 
 use probepath_robot::motion::follow::Curve;
 use probepath_robot::motion::timing::PathClock;
-use probepath_robot::{Asked, Command, ContactLaw, ContactSettings, Controller, Joints, Operator, State};
+use probepath_robot::{
+    Asked, Command, ContactLaw, ContactSettings, Controller, Joints, Operator, Safety, State,
+};
 
 use crate::Plan;
 use crate::plan::Leg;
@@ -80,6 +82,13 @@ impl Replay {
         let board = Board::default();
         let (begun, pace) = (false, f64::INFINITY);
         Ok(Self { plan, settings, operator, stage, legs, clock, law, touch, last, begun, board, pace, dt })
+    }
+
+    /// The same, slow at first: at the speed of a resume, then e times faster every second. After a stop.
+    #[must_use]
+    pub const fn slowly(mut self) -> Self {
+        self.pace = self.settings.resume_speed;
+        self
     }
 
     /// Where it is now.
@@ -174,8 +183,8 @@ impl Replay {
         let yielding = force > soft || (yielding && force > 0.5 * (soft + self.settings.force_n));
         let waits = pause || yielding;
         let cap = if waits { self.settings.resume_speed } else { self.risen(cap) };
-        let speed =
-            if waits { 0.0 } else { self.plan.settings.speed.speed.min(cap) * self.settings.eased(force) };
+        let most = self.plan.settings.speed.speed.min(cap).min(self.pace);
+        let speed = if waits { 0.0 } else { most * self.settings.eased(force) };
         let s = self.clock.step(speed, self.dt);
         self.stage = if self.touch.is_lost(force, self.settings.lost_below_n) {
             Stage::Lift { ending: ReplayEnding::ContactLost { at_m: s } }
@@ -226,7 +235,9 @@ impl Replay {
 
     fn tick(&mut self, state: &State) -> Option<Joints> {
         let pause = self.operator.wish() != Asked::Go;
-        self.pace = if pause { self.settings.resume_speed } else { self.pace * (1.0 + self.dt) };
+        // In reduced mode the arm's controller stops whoever is fast.
+        let slow = pause || state.safety == Safety::Reduced;
+        self.pace = if slow { self.settings.resume_speed } else { self.pace * (1.0 + self.dt) };
         match self.stage {
             Stage::Approach { leg } => self.approach(state, leg, pause),
             Stage::Descend => self.descend(state, pause),

@@ -3,7 +3,7 @@
 mod status;
 
 use probepath_frames::{Base, Pose, Probe};
-use probepath_robot::{Asked, Command, Controller, InverseOptions, Joints, Operator, State};
+use probepath_robot::{Asked, Command, Controller, InverseOptions, Joints, Operator, Safety, State};
 
 use crate::plan::{Leg, legs, outside, too_near_to_a_limit};
 use crate::{Place, PlanError, PlanSettings, ProbeArm, Refusal};
@@ -149,6 +149,13 @@ impl Round {
         })
     }
 
+    /// The same, slow at first: at 10 mm/s, then e times faster every second. After a stop.
+    #[must_use]
+    pub const fn slowly(mut self) -> Self {
+        self.pace = RESUMED_M_S;
+        self
+    }
+
     /// A handle that says where it is, while the loop holds the round itself.
     pub fn watch(&self) -> RoundWatch {
         self.board.watch()
@@ -233,7 +240,8 @@ impl Controller for Round {
             }
         }
         let pause = self.operator.wish() == Asked::Pause;
-        self.pace = if pause { RESUMED_M_S } else { self.pace * (1.0 + self.dt) };
+        let slow = pause || state.safety == Safety::Reduced;
+        self.pace = if slow { RESUMED_M_S } else { self.pace * (1.0 + self.dt) };
         let next = self.advance(pause);
         self.tell();
         next.map(|joints| {

@@ -75,7 +75,7 @@ fn rise(off: f64) -> f64 {
 
 /// [`Pressure`] of a wrench that is smoothed first, tick by tick: a single tick's torque is too noisy to say where the
 /// force acts.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactWatch {
     face: Face,
     share: f64,

@@ -1,134 +1,13 @@
 //! The loop on an arm of two joints that does what it is told, one tick late, and fails when it is told to.
 
-use probepath_frames::{Base, Direction, Point, Probe, Span, Stamp, Wrench, nalgebra::Vector3};
+use probepath_frames::{Direction, Point, Pose, nalgebra::Translation3};
 
+use super::test_arm::{Fails, PERIOD, TestArm, check, limits, there};
 use super::*;
-use crate::{
-    Brake, GuardLimits, Hold, Joints, MotionLimits, Operator, Phase, Plane, PointToPoint, RecordedArm,
-    Safety, Workspace,
-};
-
-const PERIOD: Span = Span::from_milliseconds(2);
-
-fn limits() -> MotionLimits {
-    MotionLimits {
-        lower: Joints::splat(2, -3.0),
-        upper: Joints::splat(2, 3.0),
-        velocity: Joints::splat(2, 1.0),
-        acceleration: Joints::splat(2, 5.0),
-        jerk: Joints::splat(2, 100.0),
-    }
-}
-
-/// What goes wrong with the arm, and at which tick.
-#[derive(Clone, Copy, Default)]
-struct Fails {
-    lost: Option<u64>,
-    late: Option<u64>,
-    frozen: Option<u64>,
-    wrench_nan: Option<u64>,
-    force: Option<(u64, f64)>,
-    jump: Option<u64>,
-    blocked: Option<u64>,
-}
-
-struct TestArm {
-    state: State,
-    fails: Fails,
-    blocked_at: Option<Joints>,
-    rows: Vec<(Command, State)>,
-}
-
-impl TestArm {
-    fn new(fails: Fails) -> Self {
-        let at = Joints::zeros(2);
-        let state = State {
-            tick: 0,
-            stamp: Stamp::ZERO,
-            position: at,
-            velocity: at,
-            commanded: at,
-            wrench: Wrench::zero(),
-            guiding: false,
-            safety: Safety::Normal,
-            age: Span::ZERO,
-        };
-        Self { state, fails, blocked_at: None, rows: Vec::new() }
-    }
-
-    fn since(&self, tick: Option<u64>) -> bool {
-        tick.is_some_and(|tick| self.state.tick >= tick)
-    }
-
-    fn measure(&mut self) {
-        let s = &mut self.state;
-        s.velocity = s.commanded.zip(&s.position, |now, before| (now - before) / PERIOD.seconds());
-        s.position = s.commanded;
-        if self.since(self.fails.blocked) {
-            self.state.position = *self.blocked_at.get_or_insert(self.state.position);
-            self.state.velocity = Joints::zeros(2);
-        }
-        if self.since(self.fails.jump) {
-            self.state.position[1] += 0.1;
-        }
-        if self.since(self.fails.wrench_nan) {
-            self.state.wrench.force.y = f64::NAN;
-        }
-        if let Some((tick, force)) = self.fails.force {
-            let force = if self.state.tick >= tick { -force } else { 0.0 };
-            self.state.wrench = Wrench::<Probe>::new(Vector3::new(0.0, 0.0, force), Vector3::zeros());
-        }
-    }
-}
-
-impl Arm for TestArm {
-    fn exchange(&mut self, command: &Command) -> Result<State, ArmFault> {
-        if self.since(self.fails.lost) {
-            return Err(ArmFault::ConnectionLost { tick: self.state.tick, why: "unplugged".into() });
-        }
-        if let Command::Position(position) = command {
-            self.state.commanded = *position;
-        }
-        if !self.since(self.fails.frozen) {
-            let late = self.fails.late == Some(self.state.tick);
-            self.state.tick += if late { 10 } else { 1 };
-            self.state.stamp = Stamp::from_nanoseconds(PERIOD.nanoseconds() * self.state.tick as i64);
-            self.measure();
-        }
-        self.rows.push((*command, self.state));
-        Ok(self.state)
-    }
-
-    fn period(&self) -> Span {
-        PERIOD
-    }
-
-    fn joints(&self) -> usize {
-        2
-    }
-}
+use crate::{Brake, GuardLimits, Hold, Joints, Operator, Phase, Plane, PointToPoint, RecordedArm, Workspace};
 
 fn guard() -> Guard {
     Guard::new(GuardLimits::default(), limits()).unwrap()
-}
-
-fn there() -> PointToPoint {
-    PointToPoint::plan(&Joints::zeros(2), &Joints::from_slice(&[1.0, -0.4]).unwrap(), &limits(), PERIOD)
-        .unwrap()
-}
-
-/// Every command of the arm within the limits, as read back from its rows.
-fn check(arm: &TestArm) {
-    let (dt, limits) = (PERIOD.seconds(), limits());
-    for joint in 0..2 {
-        let positions: Vec<f64> = arm.rows.iter().map(|(_, state)| state.commanded[joint]).collect();
-        for q in positions.windows(4) {
-            let jerk = (((q[3] - q[2]) - (q[2] - q[1])) - ((q[2] - q[1]) - (q[1] - q[0]))).abs() / dt.powi(3);
-            assert!((q[3] - q[2]).abs() / dt <= limits.velocity[joint]);
-            assert!((q[3] - 2.0 * q[2] + q[1]).abs() / dt.powi(2) <= limits.acceleration[joint]);
-            assert!(jerk <= limits.jerk[joint], "{jerk}");
-        }
-    }
 }
 
 fn stopped(fails: Fails) -> (TestArm, Guard, RunError) {
@@ -193,7 +72,8 @@ fn too_much_force_is_lifted_out_of_but_not_pressed_into() {
     let (arm, mut guard, error) = stopped(Fails { force: Some((300, 16.0)), ..Fails::default() });
     assert!(error.reason.asks_to_lift());
     assert!(matches!(guard.confirm(&arm.state), Err(Trip::Force { .. })));
-    guard.confirm_to_lift(&arm.state).unwrap();
+    let mut arm = arm;
+    guard.confirm_to_lift(&arm.exchange(&Command::Stay).unwrap()).unwrap();
     let lifted = |force| {
         let mut arm = TestArm::new(Fails { force: Some((0, force)), ..Fails::default() });
         let mut guard = Guard::new(GuardLimits::default(), limits()).unwrap();
@@ -262,6 +142,7 @@ fn a_hold_holds_for_its_ticks_and_a_brake_ends_at_rest() {
     assert_eq!(finished.ending, Ending::Operator);
     guard.operator().allow();
     let mut arm = TestArm::new(Fails::default());
+    guard.confirm(&arm.exchange(&Command::Stay).unwrap()).unwrap();
     let mut brake = Brake::default();
     let finished = run(&mut arm, &mut Then(there(), 300, &mut brake), &mut guard, &mut ()).unwrap();
     assert_eq!(finished.ending, Ending::Done);
@@ -347,7 +228,8 @@ fn an_observer_that_panics_stops_the_arm_and_is_left_alone() {
 #[test]
 fn the_workspace_and_the_probes_speed_are_kept_before_a_command_is_sent() {
     // The probe a metre from the first joint's axis: its angle is its y, nearly.
-    let place = || Box::new(|q: &Joints| Point::<Base>::new(q[0].cos(), q[0].sin(), 0.0));
+    // FRAMES: the arm of this test has the probe there, its axes those of the base.
+    let place = || Box::new(|q: &Joints| Pose::assume(Translation3::new(q[0].cos(), q[0].sin(), 0.0).into()));
     let wall = Plane { through: Point::new(0.0, 0.01, 0.0), inward: Direction::y().reversed() };
     let (mut arm, fast) =
         (TestArm::new(Fails::default()), GuardLimits { free_speed_m_s: 2.0, ..GuardLimits::default() });
