@@ -14,6 +14,7 @@ pub mod dots;
 pub mod errors;
 pub mod exam;
 pub mod fit;
+pub mod igtl;
 pub mod label;
 pub mod lag;
 pub mod phantom;

@@ -36,6 +36,24 @@ pub enum SourceFault {
         /// The cause, in words.
         why: String,
     },
+    /// Nobody answers.
+    #[error(
+        "no ultrasound machine answers at {place}: {why}; is it on, does it serve OpenIGTLink, is the port open?"
+    )]
+    Unreachable {
+        /// Host and port.
+        place: String,
+        /// The cause, in words.
+        why: String,
+    },
+    /// What came is no B-scan.
+    #[error("what the ultrasound machine sent by {at} cannot be used: {why}")]
+    Unreadable {
+        /// When it was noticed.
+        at: Stamp,
+        /// The cause, in words.
+        why: String,
+    },
     /// A sequence from disk is over.
     #[error("the sequence ended after {count} B-scans")]
     Ended {
