@@ -45,9 +45,14 @@ fn scan(args: crate::cli::Scan, screen: &Screen) -> Outcome {
     let stopping = operator.clone();
     // A second Ctrl-C does nothing more: the first one already brakes the arm, and the exam has to be closed.
     ctrlc::set_handler(move || stopping.stop())?;
-    let request =
-        ScanRequest { protocol: args.protocol, cell: args.cell, seed: args.seed, out: args.out, date: None };
+    let crate::cli::Scan { protocol, cell, seed, out } = args;
+    let request = ScanRequest { protocol, cell, seed, out, date: Some(today()) };
     Ok(Document::of(&request.run(&operator, screen.progress())?)?)
+}
+
+/// Today, as ISO 8601 has it: the one place where a command asks for the day.
+fn today() -> String {
+    jiff::Timestamp::now().strftime("%Y-%m-%d").to_string()
 }
 
 fn validated(args: &crate::cli::Validate, screen: &Screen) -> Outcome {

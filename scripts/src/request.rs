@@ -22,7 +22,7 @@ pub struct ScanRequest {
     pub seed: u64,
     /// Folder for everything that is made.
     pub out: PathBuf,
-    /// The day, where the exam is a real one.
+    /// The day, for exams of cells on their wire; a cell that is simulated in this process knows none.
     pub date: Option<String>,
 }
 
@@ -63,12 +63,13 @@ impl ScanRequest {
             None if protocol.is_calibration() => CellFile::wire_phantom(),
             None => CellFile::default(),
         };
+        let date = self.date.clone().filter(|_| !cell.is_simulated());
         let session = Session::open(Opening {
             cell,
             seed: self.seed,
             out: self.out.clone(),
             protocol: protocol.clone(),
-            date: self.date.clone(),
+            date,
             operator: operator.clone(),
             progress,
         })?;

@@ -4,6 +4,7 @@
 //! and every tick of it is recorded. Protocols, the command line and (later) the console speak to this and to nothing
 //! below it.
 
+mod bedside;
 mod calibrate;
 mod cell;
 mod error;
@@ -22,11 +23,16 @@ use std::path::{Path as FilePath, PathBuf};
 use std::sync::Arc;
 
 use probepath_frames::Stamp;
-use probepath_robot::{Guard, MotionLimits, Operator};
+use probepath_robot::drivers::Address;
+use probepath_robot::{Guard, MotionLimits, Operator, State, Trip};
+use probepath_sim::{SimulatedCell, Truth};
 use probepath_us_capture::exam::{Attachment, Event, ExamHeader, ExamWriter, Level, Pace, Written};
 
 pub use calibrate::{CalibrateWish, Calibrated, Checked, StandardError};
-pub use cell::{CellFile, ForceFile, LimitsFile, StoredCalibration};
+pub use cell::{
+    ArmFile, BoxFile, CellFile, ControllerTime, ForceFile, IGTL_PORT, LimitsFile, MachineAddress,
+    MachineClock, MachineFile, PlaneFile, PoseFile, SettingFile, StoredCalibration, WorkspaceFile,
+};
 pub use error::SessionError;
 pub use locate::Located;
 pub use recorded::protocol_of;
@@ -35,7 +41,7 @@ pub(crate) use report::SEGMENTS;
 pub use report::{ReportWish, Segment};
 pub(crate) use scan::SCAN_FIGURES;
 pub use scan::{Lumen, Scan, ScanWish};
-pub use teach::TeachWish;
+pub use teach::{GuideBy, TeachWish};
 pub use truth::{CalibrationTruth, StenosisError};
 pub use visit::{CalibrationPlan, PhantomImages, VisitWish, Visits};
 
@@ -43,6 +49,7 @@ use crate::progress::Progress;
 use crate::protocol::Protocol;
 use crate::report::{Report, SurfaceError};
 use cell::Cell;
+use recorder::{Stand, Taped};
 
 /// This software, as exams and reports name it.
 pub const SOFTWARE: &str = concat!("probepath ", env!("CARGO_PKG_VERSION"));
@@ -71,6 +78,8 @@ pub struct Session {
     guard: Guard,
     opening: Opening,
     exam: Option<ExamWriter>,
+    /// When this session began, and what time it is, by the arm's clock.
+    began: Stamp,
     now: Stamp,
     warnings: Vec<String>,
     /// How far smoothing moved the taught path (m), once one was taught.
@@ -84,18 +93,25 @@ impl Session {
     /// # Errors
     /// When the cell cannot be connected or built, or the folder cannot be made.
     pub fn open(opening: Opening) -> Result<Self, SessionError> {
-        std::fs::create_dir_all(&opening.out).map_err(|source| SessionError::File {
-            doing: "make the folder",
-            path: opening.out.clone(),
-            source,
-        })?;
+        Self::make_folder(&opening.out)?;
         let cell = Cell::connect(&opening.cell, opening.seed)?;
+        Self::beside(cell, opening)
+    }
+
+    fn make_folder(out: &FilePath) -> Result<(), SessionError> {
+        let wrong = |source| SessionError::File { doing: "make the folder", path: out.into(), source };
+        std::fs::create_dir_all(out).map_err(wrong)
+    }
+
+    /// A session of a connected cell.
+    fn beside(cell: Cell, opening: Opening) -> Result<Self, SessionError> {
         let guard = cell.guard(&opening.operator)?;
         Ok(Self {
             cell,
             guard,
             opening,
             exam: None,
+            began: Stamp::ZERO,
             now: Stamp::ZERO,
             warnings: Vec::new(),
             smoothed_m: None,
@@ -125,22 +141,26 @@ impl Session {
 
     /// How far a reconstruction is from the lumen that is truly there; only a simulated cell can say.
     pub fn surface_error(&self, lumen: &Lumen) -> Option<SurfaceError> {
-        truth::surface_error(self.cell.simulated.truth(), &lumen.recon)
+        truth::surface_error(self.truth()?, &lumen.recon)
     }
 
     /// Every true stenosis inside a reconstruction, beside what was found; only a simulated cell can say.
     pub fn stenosis_errors(&self, lumen: &Lumen) -> Vec<StenosisError> {
-        truth::stenoses(self.cell.simulated.truth(), &lumen.recon)
+        self.truth().map(|truth| truth::stenoses(truth, &lumen.recon)).unwrap_or_default()
     }
 
     /// How far a calibration is from where the image truly is; only a simulated cell can say.
-    pub fn calibration_error(&self, calibrated: &Calibrated) -> CalibrationTruth {
-        truth::calibration_error(&self.cell.simulated, calibrated)
+    pub fn calibration_error(&self, calibrated: &Calibrated) -> Option<CalibrationTruth> {
+        Some(truth::calibration_error(self.cell.simulated.as_ref()?, calibrated))
     }
 
     /// RMS error of the force that the skin truly felt along the path (N); only a simulated cell can say.
     pub fn true_force_rms(&self, scan: &Scan) -> Option<f64> {
-        truth::force_rms(self.cell.simulated.truth(), scan)
+        truth::force_rms(self.truth()?, scan)
+    }
+
+    fn truth(&self) -> Option<&Truth> {
+        self.cell.simulated.as_ref().map(SimulatedCell::truth)
     }
 
     /// What a reader must know before believing a number; goes into the report.
@@ -153,6 +173,34 @@ impl Session {
     pub fn say(&mut self, text: &str) {
         self.opening.progress.say(text);
         self.event(Level::Info, text);
+    }
+
+    /// After the arm stopped by itself or was stopped: makes it ready to move again, asks it where it is, and takes that
+    /// for the fresh confirmation that the guard wants. Nothing moves; whoever calls this has found the cause and
+    /// looked at the arm.
+    ///
+    /// # Errors
+    /// When the arm cannot be made ready, does not answer, or is not fit to move: the error says what to do first.
+    pub fn recover(&mut self) -> Result<(), SessionError> {
+        const STEP: &str = "recovering";
+        self.begin_exam("RECOVERY")?;
+        let done = self.cell.arm.recover()?;
+        self.say(&done);
+        let state = self.ask_where(STEP, "recover")?;
+        let refused = |trip: Trip| SessionError::Ended { step: STEP, why: trip.to_string() };
+        self.guard.confirm(&state).map_err(refused)?;
+        self.say("The arm may move again.");
+        Ok(())
+    }
+
+    /// Where the arm says that it is; asking is an exchange like any other, and is kept like one.
+    fn ask_where(&mut self, step: &'static str, phase: &'static str) -> Result<State, SessionError> {
+        let exam = self.exam.as_ref().ok_or(SessionError::Order("the exam was not begun"))?;
+        let stand = || Stand { phase, along_m: None, look: false, fraction: 0.0 };
+        let mut taped = Taped { arm: &mut *self.cell.arm, exam, facts: &self.cell.facts, stand: &stand };
+        let state = motion::ask(step, &mut taped)?;
+        self.now = state.stamp;
+        Ok(state)
     }
 
     /// Ends the exam: everything is written when this returns. Dropping a session leaves a readable exam too, without
@@ -176,24 +224,36 @@ impl Session {
         if self.exam.is_some() {
             return Ok(());
         }
-        let protocol = &self.opening.protocol;
+        let (protocol, calibration) = (&self.opening.protocol, self.cell.calibration.as_ref());
         let header = ExamHeader {
             software: SOFTWARE.into(),
             study_code: study.into(),
             protocol: protocol.name.clone(),
             protocol_sha256: ExamHeader::sha256(&protocol.text),
-            calibration_id: self.cell.calibration.id.clone(),
-            seed: Some(self.opening.seed),
+            calibration_id: calibration.map(|known| known.id.clone()).unwrap_or_default(),
+            // A cell on its wire has none, whatever simulates it.
+            seed: self.cell.file.is_simulated().then_some(self.opening.seed),
             joint_names: self.cell.facts.model.joint_names().to_vec(),
             period: self.cell.arm.period(),
         };
-        let exam = ExamWriter::create(&self.exam_path(), &header, Pace::Simulated)?;
+        let exam = ExamWriter::create(&self.exam_path(), &header, self.pace())?;
         exam.attach(Attachment::urdf(self.cell.urdf.as_str()));
         exam.attach(Attachment::cell(self.cell.file.text()?));
-        exam.attach(Attachment::calibration(self.cell.calibration.to_toml()?));
+        if let Some(calibration) = calibration {
+            exam.attach(Attachment::calibration(calibration.to_toml()?));
+        }
         exam.attach(Attachment::protocol(protocol.text.as_str()));
         self.exam = Some(exam);
         Ok(())
+    }
+
+    /// Whether the arm waits while the disk is slow.
+    fn pace(&self) -> Pace {
+        let arm = &self.cell.file.arm;
+        match (&arm.address, arm.time) {
+            (Address::Ur { .. }, ControllerTime::Wall) => Pace::RealTime,
+            _ => Pace::Simulated,
+        }
     }
 
     /// A file of this session.

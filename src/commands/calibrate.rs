@@ -4,7 +4,7 @@ use probepath_scripts::offline::calibrate::{
     self, CheckRequest, SpatialRequest, SubjectRequest, TemporalRequest,
 };
 
-use super::Outcome;
+use super::{Outcome, today};
 use crate::cli::{Calibrate, Check, Spatial, Subject, Temporal};
 use crate::screen::{Document, Screen};
 
@@ -65,9 +65,4 @@ fn check(args: Check, screen: &Screen) -> Outcome {
 fn subject(args: Subject) -> SubjectRequest {
     let Subject { phantom, poses, region, fan, orientation } = args;
     SubjectRequest { phantom, poses, region, fan, orientation }
-}
-
-/// Today, as ISO 8601 has it: the one place where a command asks for the day.
-fn today() -> String {
-    jiff::Timestamp::now().strftime("%Y-%m-%d").to_string()
 }

@@ -19,7 +19,8 @@
 //! # }
 //! ```
 //!
-//! - [`HandGuide`] is the controller that gives way to the hand, while a [`Recorder`] keeps every state.
+//! - [`HandGuide`] is the controller that gives way to the hand, while a [`Recorder`] keeps every state; [`Freedrive`]
+//!   leaves that to the arm's own means.
 //! - [`Path`] is what was taught, cleaned of approach, lifts, pauses, doubling back and tremor: poses at uniform spacing.
 //! - [`Plan`] is the whole replay tried out before anything moves: reach, limits, singularities, workspace, speed.
 //! - [`Replay`] is the controller that follows a plan at constant force; [`LiftOff`] takes the probe off after a stop.
@@ -29,6 +30,7 @@
 //! plan's offset along the probe's axis.
 
 mod error;
+mod freedrive;
 mod hand_guide;
 mod lift_off;
 mod path;
@@ -40,6 +42,7 @@ mod replay;
 mod round;
 
 pub use error::PathError;
+pub use freedrive::Freedrive;
 pub use hand_guide::{GiveWay, GuideError, HandGuide};
 pub use lift_off::LiftOff;
 pub use path::{

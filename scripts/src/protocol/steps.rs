@@ -9,13 +9,13 @@ use rhai::{Array, Dynamic, Engine, EvalAltResult, Map, NativeCallContext};
 use super::{Stage, lock};
 use crate::options::Options;
 use crate::quantity::{Force, Length, Speed};
-use crate::session::{Lumen, ReportWish, Scan, ScanWish, Segment, Session, SessionError, TeachWish};
+use crate::session::{GuideBy, Lumen, ReportWish, Scan, ScanWish, Segment, Session, SessionError, TeachWish};
 
 pub(super) type Outcome<T> = Result<T, Box<EvalAltResult>>;
 
 /// How each step is written, for messages.
 const USAGE: &[(&str, &str)] = &[
-    ("teach", "teach(#{ study: \"LEG-007\", side: \"left\" })"),
+    ("teach", "teach(#{ study: \"LEG-007\", side: \"left\" }), or with by: \"freedrive\""),
     ("load_path", "load_path(\"femoral.path.toml\")"),
     ("save", "path.save(\"femoral.path.toml\")"),
     ("trim", "path.trim(mm(10), mm(210))"),
@@ -24,6 +24,7 @@ const USAGE: &[(&str, &str)] = &[
     ("reconstruct", "reconstruct(images) or reconstruct(images, #{ seed_x: mm(20), seed_y: mm(30) })"),
     ("segment", "segment(\"CFA\", mm(0), mm(40))"),
     ("report", "report(lumen) or report(lumen, #{ segments: [segment(\"CFA\", mm(0), mm(40))] })"),
+    ("recover", "recover(), after the arm stopped by itself and the cause was found"),
     ("warn", "warn(\"what the reader must know\")"),
 ];
 
@@ -139,6 +140,10 @@ fn reports(engine: &mut Engine, stage: &Stage) {
         },
     );
     let s = stage.clone();
+    engine.register_fn("recover", move |context: NativeCallContext| -> Outcome<()> {
+        s.step(&context, Session::recover)
+    });
+    let s = stage.clone();
     engine.register_fn("warn", move |text: &str| lock(&s.session).warn(text));
 }
 
@@ -149,6 +154,8 @@ impl Stage {
         context: &NativeCallContext<'_>,
         step: impl FnOnce(&mut Session) -> Result<T, SessionError>,
     ) -> Outcome<T> {
+        // What an earlier step met was caught by the script, and is no longer what ends it.
+        *lock(&self.failed) = None;
         step(&mut lock(&self.session)).map_err(|error| {
             let message = error.to_string();
             *lock(&self.failed) = Some(error);
@@ -173,6 +180,17 @@ fn teach_wish(map: Map) -> Result<TeachWish, String> {
             "left" => Side::Left,
             "right" => Side::Right,
             other => return Err(format!("teach: `side` is \"left\" or \"right\"; found \"{other}\"")),
+        };
+    }
+    if let Some(by) = options.text("by")? {
+        wish.by = match by.as_str() {
+            "compliance" => GuideBy::Compliance,
+            "freedrive" => GuideBy::Freedrive,
+            other => {
+                return Err(format!(
+                    "teach: `by` is \"compliance\" (probepath gives way) or \"freedrive\" (the arm does); found \"{other}\""
+                ));
+            }
         };
     }
     options.done()?;

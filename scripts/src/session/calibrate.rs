@@ -240,7 +240,7 @@ impl Session {
                 assumed_m_s: ASSUMED_M_S,
             },
             lag: Lag::Estimated { from: Span::from_seconds(-MOST_LAG_S), to: Span::from_seconds(MOST_LAG_S) },
-            nominal: Some(self.cell.calibration.probe_from_image),
+            nominal: self.cell.calibration.as_ref().map(|known| known.probe_from_image),
             ..SpatialOptions::new(place)
         }
     }

@@ -116,6 +116,11 @@ pub enum SessionError {
         "the cell has no wire phantom: name one under [simulated.subject.wire_phantom] in the cell's file"
     )]
     NoPhantom,
+    /// The cell has no ultrasound machine.
+    #[error(
+        "the cell has no ultrasound machine: name one under [machine] in the cell's file, or scan without looking"
+    )]
+    NoMachine,
     /// The landmarks that were touched say no place.
     #[error("the phantom's landmarks: {0}")]
     Pointer(#[from] PointerError),

@@ -61,7 +61,10 @@ impl Session {
         let measured = self.phantom_as_measured()?;
         self.say("Guide the ball pointer into every landmark.");
         // The simulated hand stands in for the operator's.
-        let touches = self.cell.simulated.touches(postures)?;
+        let simulated = self.cell.simulated.as_ref().ok_or(SessionError::Order(
+            "landmarks are touched only in a cell that is simulated in this process: use the phantom's place as measured",
+        ))?;
+        let touches = simulated.touches(postures)?;
         let of = |landmark: usize| -> Vec<Pose<World, Flange>> {
             touches.iter().filter(|t| t.landmark == landmark).map(|t| t.world_from_flange).collect()
         };

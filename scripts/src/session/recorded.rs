@@ -7,6 +7,7 @@ use probepath_robot::{Command, Joints, RecordedArm, Safety, State};
 use probepath_us_capture::exam::{Attachment, Exam, TickRecord};
 use probepath_us_capture::{BScan, BScanSource, Calibration, SourceFault};
 
+use super::cell::Cell;
 use super::{CellFile, Opening, Session, SessionError, StoredCalibration};
 use crate::protocol::Protocol;
 
@@ -25,12 +26,13 @@ impl Session {
             cell.stored = Some(calibration_of(exam)?);
         }
         let seed = exam.header.seed.unwrap_or(opening.seed);
-        let mut session = Self::open(Opening { cell, seed, ..opening })?;
         let rows: Vec<_> = exam.ticks.iter().map(row).collect::<Result<_, _>>()?;
         let (period, joints) = (exam.header.period, exam.header.joint_names.len());
-        session.cell.arm = Box::new(RecordedArm::new(rows.into_iter(), period, joints));
-        session.cell.machine = Box::new(RecordedMachine::of(exam));
-        Ok(session)
+        let arm = Box::new(RecordedArm::new(rows.into_iter(), period, joints));
+        let urdf = exam.attachment(Attachment::URDF).map(Attachment::text).transpose()?;
+        let cell_of_exam = Cell::recorded(&cell, seed, urdf, arm, Box::new(RecordedMachine::of(exam)))?;
+        Self::make_folder(&opening.out)?;
+        Self::beside(cell_of_exam, Opening { cell, seed, ..opening })
     }
 }
 

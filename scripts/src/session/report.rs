@@ -58,6 +58,7 @@ impl Session {
 
     fn heading(&self, lumen: &Lumen) -> Heading {
         let (opening, label) = (&self.opening, &lumen.scan.label);
+        let calibration = self.cell.calibration.as_ref();
         Heading {
             study: label.study.clone(),
             side: format!("{:?}", label.side).to_lowercase(),
@@ -67,7 +68,7 @@ impl Session {
             protocol_sha256: ExamHeader::sha256(&opening.protocol.text),
             software: SOFTWARE.into(),
             speed_mm_s: lumen.scan.figures.speed_mm_s,
-            ..Heading::of_calibration(&self.cell.calibration)
+            ..calibration.map_or_else(Heading::default, Heading::of_calibration)
         }
     }
 }

@@ -109,16 +109,19 @@ impl Session {
             report.least_singular.1 * 1e3
         ));
         let keeping = wish.every_m.map_or(Keeping::All, |every_m| Keeping::Spaced { every_m });
-        let mut capture = Capture::new(self.cell.calibration.clone(), keeping)?;
+        let mut capture = wish.look.then(|| self.capture(keeping)).transpose()?;
         let mut figures = Figures::new(path.curve().clone(), wish.force_n);
         let mut images = Vec::new();
-        self.replay(plan, wish, &mut capture, &mut figures, &mut images)?;
-        capture.finish();
-        self.keep_rest(&mut capture, &mut images);
-        let figures_of_scan = self.scan_figures(path, wish, &capture, &figures)?;
+        self.replay(plan, wish, capture.as_mut(), &mut figures, &mut images)?;
+        if let Some(capture) = &mut capture {
+            capture.finish();
+            self.keep_rest(capture, &mut images);
+        }
+        let counts = capture.map(|capture| capture.counts()).unwrap_or_default();
+        let figures_of_scan = self.scan_figures(path, wish, counts, &figures)?;
         let scan = Scan {
             images,
-            counts: capture.counts(),
+            counts,
             figures: figures_of_scan,
             wish: *wish,
             label: path.label().clone(),
@@ -129,15 +132,19 @@ impl Session {
         Ok(scan)
     }
 
+    /// What takes B-scans, where there is a machine.
+    fn capture(&self, keeping: Keeping) -> Result<Capture, SessionError> {
+        Ok(Capture::new(self.cell.calibrated()?.clone(), keeping)?)
+    }
+
     /// What the scan has to say, kept in the exam.
     fn scan_figures(
         &mut self,
         path: &Path,
         wish: &ScanWish,
-        capture: &Capture,
+        counts: Counts,
         figures: &Figures,
     ) -> Result<ScanFigures, SessionError> {
-        let counts = capture.counts();
         let dropped = counts.lost + counts.in_gap + counts.out_of_order;
         let summary = ScanFigures {
             force_n: figures.force(),
@@ -148,7 +155,7 @@ impl Session {
             },
             dropped: usize::try_from(dropped).unwrap_or(usize::MAX),
             speed_mm_s: wish.speed_m_s * 1e3,
-            duration_s: self.now.seconds(),
+            duration_s: (self.now - self.began).seconds(),
             warnings: Vec::new(),
         };
         let text = serde_json::to_vec(&summary).map_err(ReportError::from)?;
@@ -164,12 +171,7 @@ impl Session {
             workspace: self.cell.workspace(),
             ..PlanSettings::default()
         };
-        // Where the arm says it was last told to be; asking is an exchange like any other, and is kept like one.
-        let exam = self.exam.as_ref().ok_or(SessionError::Order("the exam was not begun"))?;
-        let stand = || Stand { phase: "plan", along_m: None, look: false, fraction: 0.0 };
-        let mut taped = Taped { arm: &mut *self.cell.arm, exam, facts: &self.cell.facts, stand: &stand };
-        let state = motion::ask("planning", &mut taped)?;
-        self.now = state.stamp;
+        let state = self.ask_where("planning", "plan")?;
         Ok(Plan::new(path, &self.cell.probe_arm(), &state.commanded, &settings)?)
     }
 
@@ -177,7 +179,7 @@ impl Session {
         &mut self,
         plan: Plan,
         wish: &ScanWish,
-        capture: &mut Capture,
+        capture: Option<&mut Capture>,
         figures: &mut Figures,
         images: &mut Vec<PlacedBScan>,
     ) -> Result<(), SessionError> {
@@ -194,16 +196,20 @@ impl Session {
         let exam = self.exam.as_ref().ok_or(SessionError::Order("the exam was not begun"))?;
         let facts = &self.cell.facts;
         let mut taped = Taped { arm: &mut *self.cell.arm, exam, facts, stand: &stand };
-        let machine = &mut *self.cell.machine;
-        let eye = wish.look.then_some(Eye {
-            machine,
-            capture,
-            images,
-            operator: &operator,
-            paused: false,
-            looked: None,
-            latest: LATEST,
-        });
+        let (paused, looked, latest) = (false, None, LATEST);
+        let eye = match (capture, self.cell.machine.as_mut()) {
+            (None, _) => None,
+            (Some(_), None) => return Err(SessionError::NoMachine),
+            (Some(capture), Some(machine)) => Some(Eye {
+                machine: &mut **machine,
+                capture,
+                images,
+                operator: &operator,
+                paused,
+                looked,
+                latest,
+            }),
+        };
         let mut recorder = Recorder {
             exam,
             facts,

@@ -3,8 +3,10 @@
 use std::path::PathBuf;
 
 use probepath_frames::{Direction, Point, World};
-use probepath_robot::GuardLimits;
-use probepath_teach_replay::{Cleaning, GiveWay, HandGuide, Label, Path, ProbeArm, Recording, Side};
+use probepath_robot::{Controller, GuardLimits};
+use probepath_teach_replay::{
+    Cleaning, Freedrive, GiveWay, HandGuide, Label, Path, ProbeArm, Recording, Side,
+};
 use probepath_us_capture::exam::Attachment;
 
 use super::recorder::{Recorder, Stand, Taped};
@@ -17,18 +19,42 @@ pub struct TeachWish {
     pub study: String,
     /// Which leg.
     pub side: Side,
+    /// How the arm gives way to the hand.
+    pub by: GuideBy,
+}
+
+/// How the arm gives way to the hand.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum GuideBy {
+    /// By our own law: a mass and a damper in every direction of the probe, within the cell's limits.
+    #[default]
+    Compliance,
+    /// By the arm's own means.
+    Freedrive,
 }
 
 impl Default for TeachWish {
     fn default() -> Self {
-        Self { study: "STUDY".into(), side: Side::Left }
+        Self { study: "STUDY".into(), side: Side::Left, by: GuideBy::default() }
     }
 }
 
 /// Room for ten minutes of guiding at 500 ticks a second.
 const MOST_SAMPLES: usize = 300_000;
 
-const TEACHING: Stand = Stand { phase: "teach", along_m: None, look: false, fraction: 0.0 };
+/// What whoever holds the probe is told.
+const GUIDE: &str = "Hold the switch, guide the probe along the artery, lift it off, let go.";
+
+impl GuideBy {
+    /// What the exam calls its ticks.
+    const fn stand(self) -> Stand {
+        let phase = match self {
+            Self::Compliance => "teach",
+            Self::Freedrive => "freedrive",
+        };
+        Stand { phase, along_m: None, look: false, fraction: 0.0 }
+    }
+}
 
 impl Session {
     /// The operator guides the probe along the artery; what comes back is the cleaned path.
@@ -37,11 +63,10 @@ impl Session {
     /// When the motion was stopped, or what was taught makes no path.
     pub fn teach(&mut self, wish: &TeachWish) -> Result<Path, SessionError> {
         self.begin_exam(&wish.study)?;
-        self.say("Hold the switch, guide the probe along the artery, lift it off, let go.");
+        self.say(GUIDE);
         let mut recording = Recording::with_capacity(MOST_SAMPLES);
-        // The hand stands in for the operator's; a real one would take the handle now.
-        self.cell.simulated.hand().guide();
-        self.guide(&mut recording)?;
+        self.cell.arm.ask_to_guide(GUIDE)?;
+        self.guide(wish.by, &mut recording)?;
         let label = Label {
             study: wish.study.clone(),
             side: wish.side,
@@ -62,16 +87,19 @@ impl Session {
         Ok(path)
     }
 
-    fn guide(&mut self, recording: &mut Recording) -> Result<(), SessionError> {
+    fn guide(&mut self, by: GuideBy, recording: &mut Recording) -> Result<(), SessionError> {
         let arm = self.cell.probe_arm();
         let usual = *self.guard.limits();
-        self.guard.set_limits(GuardLimits::hand_guiding());
-        let stand = || TEACHING;
+        self.guard.set_limits(self.cell.as_the_file_says(GuardLimits::hand_guiding()));
+        let stand = || by.stand();
         let exam = self.exam.as_ref().ok_or(SessionError::Order("the exam was not begun"))?;
         let facts = &self.cell.facts;
         let mut taped = Taped { arm: &mut *self.cell.arm, exam, facts, stand: &stand };
         let start = motion::ask("teaching", &mut taped)?.commanded;
-        let mut controller = HandGuide::new(arm, &start, GiveWay::default())?;
+        let mut controller: Box<dyn Controller> = match by {
+            GuideBy::Compliance => Box::new(HandGuide::new(arm, &start, GiveWay::default())?),
+            GuideBy::Freedrive => Box::new(Freedrive::new(arm.period.seconds())),
+        };
         let mut recorder = Recorder {
             exam,
             facts,
@@ -84,7 +112,7 @@ impl Session {
             figures: None,
             now: self.now,
         };
-        let done = motion::perform("teaching", &mut taped, &mut controller, &mut self.guard, &mut recorder);
+        let done = motion::perform("teaching", &mut taped, &mut *controller, &mut self.guard, &mut recorder);
         self.now = recorder.now;
         self.guard.set_limits(usual);
         done

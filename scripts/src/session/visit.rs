@@ -1,7 +1,7 @@
 //! Visiting a phantom: the plan of poses and sweeps, and the B-scans of it with the probe's track.
 
 use probepath_frames::{Direction, Phantom, Point, Pose, Probe, Span, Track, World};
-use probepath_robot::{GuardLimits, Joints, Plane, Workspace};
+use probepath_robot::{GuardLimits, Plane, Workspace};
 use probepath_teach_replay::{PlanSettings, Round, RoundPhase, RoundStatus, Stop};
 use probepath_us_capture::plan::{Bench, Expected, VisitOptions, VisitPlan, expected};
 use probepath_us_capture::shots::{Shot, Shots};
@@ -112,12 +112,12 @@ impl Session {
         options: &VisitOptions,
     ) -> Result<CalibrationPlan, SessionError> {
         self.begin_exam("CALIBRATION")?;
-        let start = self.ask_where("planning the calibration")?;
+        let start = self.ask_where("planning the calibration", "plan")?.commanded;
         let settings = self.in_water(located, options.clearance_m);
         let (arm, base_from_world) = (self.cell.probe_arm(), self.cell.facts.world_from_base.inverse());
         let options = VisitOptions { place_sd_m: located.sd_m, place_sd_rad: located.sd_rad, ..*options };
         let (phantom, world_from_phantom) = (&located.phantom, located.world_from_phantom);
-        let calibration = &self.cell.calibration;
+        let calibration = self.cell.calibrated()?;
         let (setting, spacing) = (calibration.setting, calibration.setting.spacing);
         let pixels = |length_m: f64, pixel_m: f64| (length_m / pixel_m).round() as usize;
         let bench = Bench {
@@ -158,14 +158,14 @@ impl Session {
     pub fn visit(&mut self, visits: &Visits, wish: &VisitWish) -> Result<PhantomImages, SessionError> {
         wish.check()?;
         self.begin_exam("CALIBRATION")?;
-        let start = self.ask_where(STEP)?;
+        let start = self.ask_where(STEP, "plan")?.commanded;
         let settings = self.in_water(&visits.located, visits.options.clearance_m);
         let (arm, operator) = (self.cell.probe_arm(), self.opening.operator.clone());
         let stops = visits.stops(wish, &self.cell.facts.world_from_base.inverse());
         let round = Round::new(&stops, &arm, (&start, &start), &settings, operator)?;
         self.say(&format!("Visiting {} places: {:.0} s.", stops.len(), round.duration_s()));
         let usual = *self.guard.limits();
-        self.guard.set_limits(limits_in_water(wish.speed_m_s));
+        self.guard.set_limits(self.cell.as_the_file_says(limits_in_water(wish.speed_m_s)));
         let gone = self.go_round(round);
         self.guard.set_limits(usual);
         let (images, track, counts) = gone?;
@@ -203,27 +203,17 @@ impl Session {
         PlanSettings { air_speed: MOST_SPEED_M_S, workspace, ..PlanSettings::default() }
     }
 
-    /// Where the arm says that it was last told to be; asking is an exchange like any other, and is kept like one.
-    fn ask_where(&mut self, step: &'static str) -> Result<Joints, SessionError> {
-        let exam = self.exam.as_ref().ok_or(SessionError::Order("the exam was not begun"))?;
-        let stand = || Stand { phase: "plan", along_m: None, look: false, fraction: 0.0 };
-        let mut taped = Taped { arm: &mut *self.cell.arm, exam, facts: &self.cell.facts, stand: &stand };
-        let state = motion::ask(step, &mut taped)?;
-        self.now = state.stamp;
-        Ok(state.commanded)
-    }
-
     fn go_round(&mut self, mut round: Round) -> Result<Seen, SessionError> {
-        let mut capture = Capture::new(self.cell.calibration.clone(), Keeping::All)?;
+        let mut capture = Capture::new(self.cell.calibrated()?.clone(), Keeping::All)?;
         let (mut images, mut track) = (Vec::new(), Track::new(WIDEST_GAP));
-        let latency = self.cell.simulated.nominal().image_latency;
+        let latency = self.cell.image_latency;
         let watch = round.watch();
         let stand = || stand_of(&watch.status());
         let exam = self.exam.as_ref().ok_or(SessionError::Order("the exam was not begun"))?;
         let (facts, operator) = (&self.cell.facts, self.opening.operator.clone());
         let mut taped = Taped { arm: &mut *self.cell.arm, exam, facts, stand: &stand };
         let eye = Eye {
-            machine: &mut *self.cell.machine,
+            machine: &mut **self.cell.machine.as_mut().ok_or(SessionError::NoMachine)?,
             capture: &mut capture,
             images: &mut images,
             operator: &operator,

@@ -106,8 +106,9 @@ impl Figures {
     fn add(&mut self, setting: &Row, seed: u64, out: &Path) -> Result<(), SessionError> {
         let mut session = open(setting, seed, out)?;
         let calibrated = calibrate(&mut session)?;
-        let truth: CalibrationTruth = session.calibration_error(&calibrated);
+        let truth: Option<CalibrationTruth> = session.calibration_error(&calibrated);
         session.close()?;
+        let truth = truth.ok_or(SessionError::Order("only a simulated cell knows the truth"))?;
         self.c_rms.push(c_rms_mm(&calibrated));
         self.mid.push(calibrated.found().mid_rms_mm);
         self.mean.push(truth.mean_mm);

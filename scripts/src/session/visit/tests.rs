@@ -38,7 +38,7 @@ fn the_arm_calibrates_by_itself_better_than_half_a_millimetre_and_checks_elsewhe
     assert!(speeds.fold(0.0, f64::max) < 0.055);
     let calibrated = session.calibrate(&images, &Default::default()).unwrap();
     let calibrated = session.check_calibration(&calibrated, &others).unwrap();
-    let (truth, found) = (session.calibration_error(&calibrated), calibrated.found());
+    let (truth, found) = (session.calibration_error(&calibrated).unwrap(), calibrated.found());
     assert!(truth.mean_mm < 0.25 && truth.p95_mm < 0.5 && truth.in_tissue_mean_mm < 0.25, "{truth:?}");
     assert!(truth.lag_ms.abs() < 2.0, "{truth:?}");
     assert!(found.labelled == found.images && found.mid_rms_mm < 0.47, "{found}");
@@ -61,8 +61,8 @@ fn used_for_tissue(bench: &Session, stored: &probepath_us_capture::Calibration) 
     let path = bench.file("leg.toml");
     std::fs::write(&path, text).unwrap();
     let leg = session(CellFile::read(&path).unwrap(), "leg");
-    assert_eq!(&leg.cell.calibration, stored);
-    let truth = leg.cell.simulated.truth().probe_from_image(&stored.setting);
+    assert_eq!(leg.cell.calibration.as_ref(), Some(stored));
+    let truth = leg.truth().unwrap().probe_from_image(&stored.setting);
     let at = |u, v| stored.setting.spacing.point(u, v);
     for (u, v) in [(0.0, 0.0), (300.0, 300.0)] {
         let off_m = (stored.probe_from_image * at(u, v)).distance(&(truth * at(u, v)));
@@ -85,7 +85,7 @@ fn landmarks_touched_find_the_phantom_better_than_a_tape_measure() {
     let mut session = session(CellFile::wire_phantom(), "touches");
     let measured = session.phantom_as_measured().unwrap();
     let touched = session.phantom_by_touch(10).unwrap();
-    let truth = session.cell.simulated.truth().world_from_phantom().unwrap();
+    let truth = session.truth().unwrap().world_from_phantom().unwrap();
     let off = |located: &Located| {
         let wires = located.phantom.wires.iter();
         let away =
