@@ -1,0 +1,436 @@
+//! [`UrArm`]: a UR e-series arm behind [`Arm`].
+
+use std::time::{Duration, Instant};
+
+use probepath_frames::{Span, Stamp};
+
+use super::connect::{Connected, Established, establish, release};
+use super::counts::UrCounts;
+use super::dashboard::Dashboard;
+use super::link::{Link, Order, Received};
+use super::measured::Measured;
+use super::registers::{command, state};
+use super::settings::TICK;
+use super::{UrError, UrSettings, safety, signs};
+use crate::{Arm, ArmFault, Command, Joints, State};
+
+/// The sending times of so many sequence numbers are kept: 128 ms of them.
+const KEPT: usize = 64;
+
+/// When nobody asked for longer than this, what came meanwhile is read away first.
+const AWAY: Duration = Duration::from_millis(10);
+
+/// Packages with one and the same echo until the script is taken to be hung. Its own watchdogs are quicker.
+const DEAF: u32 = 50;
+
+/// A UR e-series arm on its wire.
+///
+/// ```no_run
+/// use probepath_frames::nalgebra::{Isometry3, Vector3};
+/// use probepath_frames::{Flange, Pose, Probe};
+/// use probepath_robot::drivers::ur::{UrArm, UrSettings};
+/// use probepath_robot::{Arm, Command, Model};
+///
+/// // FRAMES: the holder's drawing: the probe's face is 180 mm in front of the flange.
+/// let flange_from_probe = Pose::<Flange, Probe>::assume(Isometry3::translation(0.0, 0.0, 0.18));
+/// let settings = UrSettings::new(Model::ur5e(), flange_from_probe, 0.62, Vector3::new(0.0, 0.0, 0.07));
+/// let mut arm = UrArm::connect("192.168.1.10", settings)?;
+/// let state = arm.exchange(&Command::Stay)?;
+/// println!("at {:?} rad", state.position);
+/// # Ok::<(), probepath_robot::drivers::ur::UrError>(())
+/// ```
+///
+/// An exchange sends the command and waits for the controller's next package, so the controller's clock paces the
+/// loop; it touches no heap. [`State::stamp`] is the controller's clock, [`State::tick`] counts its ticks, so a package
+/// that was skipped shows as a gap. After a fault every further exchange gives the same fault, until a person
+/// has [recovered](Self::recover) the arm: that redoes everything from the first byte, and resumes nothing.
+///
+/// While the last command was [`Command::Stay`] nothing need be exchanged: the arm rests. While it moves, or gives way,
+/// a silence of [`UrSettings::watchdog`] makes our script stop it.
+#[derive(Debug)]
+pub struct UrArm {
+    host: String,
+    settings: UrSettings,
+    /// `None` once it is lost.
+    link: Option<Link>,
+    dashboard: Dashboard,
+    report: Connected,
+    counts: UrCounts,
+    sequence: i32,
+    session: i32,
+    last: Measured,
+    /// The controller's ticks when we connected.
+    first_tick: i64,
+    /// When each of the last sequence numbers left.
+    sent: [Instant; KEPT],
+    /// When the last package was read, and when the receive buffer was last seen empty after an absence.
+    heard: Instant,
+    emptied: Option<Instant>,
+    round_trip: Duration,
+    same_echo: u32,
+    fault: Option<ArmFault>,
+}
+
+impl UrArm {
+    /// Connects: versions, dashboard, recipes, readiness, our model against the controller's, our script, payload.
+    ///
+    /// # Errors
+    /// When any of it is not as it has to be, in words; nothing moves in that case.
+    pub fn connect(host: &str, settings: UrSettings) -> Result<Self, UrError> {
+        let Established { link, dashboard, last, sequence, session, report } = establish(host, &settings)?;
+        let now = Instant::now();
+        let counts = UrCounts { connections: 1, ..UrCounts::default() };
+        Ok(Self {
+            host: host.to_owned(),
+            settings,
+            link: Some(link),
+            dashboard,
+            report,
+            counts,
+            sequence,
+            session,
+            last,
+            first_tick: ticks(last.timestamp_s),
+            sent: [now; KEPT],
+            heard: now,
+            emptied: None,
+            round_trip: Duration::ZERO,
+            same_echo: 0,
+            fault: None,
+        })
+    }
+
+    /// What was found out while connecting.
+    pub const fn report(&self) -> &Connected {
+        &self.report
+    }
+
+    /// What went over the wire, and what did not.
+    pub const fn counts(&self) -> UrCounts {
+        self.counts
+    }
+
+    /// Why it does not move any more.
+    pub const fn fault(&self) -> Option<&ArmFault> {
+        self.fault.as_ref()
+    }
+
+    /// On a person's word, after a fault: unlocks a protective stop, connects anew, sends our script, checks everything
+    /// again. The arm is at rest then, and stays so: what was commanded before is forgotten.
+    ///
+    /// # Errors
+    /// When there is no fault, or a person has to do something at the arm first.
+    pub fn recover(&mut self) -> Result<State, UrError> {
+        if self.fault.is_none() {
+            return Err(UrError::NothingToRecover);
+        }
+        self.reconnect()
+    }
+
+    /// Connects anew, as [`recover`](Self::recover) does, whether there was a fault or not.
+    ///
+    /// # Errors
+    /// As [`recover`](Self::recover); the fault stays then.
+    pub fn reconnect(&mut self) -> Result<State, UrError> {
+        let tick = self.tick();
+        self.link = None;
+        let why = "it is being connected anew".into();
+        self.fault.get_or_insert(ArmFault::ConnectionLost { tick, why });
+        release(&self.host)?;
+        let Established { link, dashboard, last, sequence, session, report } =
+            establish(&self.host, &self.settings)?;
+        let now = Instant::now();
+        (self.link, self.dashboard, self.report, self.last) = (Some(link), dashboard, report, last);
+        (self.sequence, self.session) = (sequence, session);
+        (self.sent, self.heard, self.emptied, self.same_echo) = ([now; KEPT], now, None, 0);
+        // A controller that was switched off begins its clock anew.
+        self.first_tick = self.first_tick.min(ticks(last.timestamp_s));
+        self.fault = None;
+        self.counts.connections += 1;
+        let joints = joints(&last.target);
+        Ok(self.state(joints, Span::ZERO))
+    }
+
+    /// Shows words on the pendant. Not from within a motion: it waits for the dashboard.
+    ///
+    /// # Errors
+    /// When the dashboard does not answer.
+    pub fn popup(&mut self, words: &str) -> Result<(), UrError> {
+        if self.dashboard.popup(words).is_err() {
+            // A dashboard may have closed an idle connection.
+            self.dashboard = Dashboard::connect(&self.host)?;
+            return self.dashboard.popup(words);
+        }
+        Ok(())
+    }
+
+    /// Takes the words away.
+    ///
+    /// # Errors
+    /// When the dashboard does not answer.
+    pub fn close_popup(&mut self) -> Result<(), UrError> {
+        if self.dashboard.close_popup().is_err() {
+            self.dashboard = Dashboard::connect(&self.host)?;
+            return self.dashboard.close_popup();
+        }
+        Ok(())
+    }
+
+    /// Zeroes the force sensor. Only with the probe in the air, which the caller knows and nobody here can.
+    ///
+    /// # Errors
+    /// When the arm moves, or is pushed harder than any bias pushes: the probe is on something then.
+    pub fn zero_sensor(&mut self) -> Result<(), UrError> {
+        const STILL: f64 = 0.01;
+        const BIAS_N: f64 = 15.0;
+        let resting = self.exchange(&Command::Stay)?;
+        let (speed, force_n) = (resting.velocity.largest(), resting.wrench.force.norm());
+        let refused = |why| Err(UrError::NotZeroed { why });
+        if !(speed < STILL && self.last.state == state::HOLDING) {
+            return refused(format!("the arm moves, its fastest joint at {speed:.3} rad/s"));
+        }
+        if !(force_n < BIAS_N) {
+            return refused(format!("it reads {force_n:.1} N, more than a bias: lift the probe off"));
+        }
+        let (before, began) = (self.last.zeroed, Instant::now());
+        while self.last.zeroed == before {
+            self.turn(command::ZERO, [0.0; 6])?;
+            if began.elapsed() > Duration::from_secs(5) {
+                return refused("the controller does not say that it did".into());
+            }
+        }
+        while self.last.state != state::HOLDING {
+            self.turn(command::STAY, [0.0; 6])?;
+        }
+        self.turn(command::STAY, [0.0; 6])?;
+        Ok(())
+    }
+
+    /// One tick, or the fault that lasts.
+    fn turn(&mut self, command: i32, setpoint: [f64; 6]) -> Result<(), ArmFault> {
+        let turned = self.sent_and_received(command, setpoint).and_then(|()| self.judge());
+        if let Err(fault) = &turned {
+            self.fault = Some(fault.clone());
+            self.counts.faults += 1;
+            self.last_word();
+        }
+        turned
+    }
+
+    fn sent_and_received(&mut self, command: i32, setpoint: [f64; 6]) -> Result<(), ArmFault> {
+        let (tick, patience) = (self.tick(), self.settings.patience());
+        let lost = |error: UrError| ArmFault::ConnectionLost { tick, why: error.to_string() };
+        let away = !self.settings.stepped && self.heard.elapsed() > AWAY;
+        let Some(link) = &mut self.link else {
+            return Err(ArmFault::ConnectionLost { tick, why: "it was lost before".into() });
+        };
+        self.emptied = None;
+        if away {
+            self.counts.late += link.drain().map_err(lost)?;
+            self.emptied = Some(Instant::now());
+        }
+        self.sequence = self.sequence.wrapping_add(1).max(1);
+        link.send(&Order { sequence: self.sequence, command, session: self.session, setpoint })
+            .map_err(lost)?;
+        let now = Instant::now();
+        if let Some(slot) = self.sent.get_mut(self.sequence as usize % KEPT) {
+            *slot = now;
+        }
+        let received = link.receive(patience).map_err(lost)?;
+        self.counts.texts = link.texts;
+        self.heard = Instant::now();
+        self.take(&received)
+    }
+
+    /// Counts what came, and what did not.
+    fn take(&mut self, received: &Received) -> Result<(), ArmFault> {
+        let Received { newest, older } = *received;
+        let (tick, seconds) = (self.tick(), newest.timestamp_s);
+        let passed = ticks(seconds) - ticks(self.last.timestamp_s);
+        if !seconds.is_finite() || passed < 0 {
+            let why = format!("its clock went from {} s to {seconds} s", self.last.timestamp_s);
+            return Err(ArmFault::ConnectionLost { tick, why });
+        }
+        if newest.position.iter().chain(&newest.target).any(|q| !q.is_finite()) {
+            let why = format!("it measured joints at {:?} rad", newest.position);
+            return Err(ArmFault::ConnectionLost { tick, why });
+        }
+        let counts = &mut self.counts;
+        counts.packages += older + 1;
+        counts.late += older;
+        // After an absence what is missing was read away, and counted as late.
+        let missing = passed.unsigned_abs().saturating_sub(older + 1);
+        if self.emptied.is_none() {
+            counts.gaps += missing;
+            counts.longest_gap = counts.longest_gap.max(missing);
+        }
+        self.same_echo = if newest.sequence == self.last.sequence { self.same_echo + 1 } else { 0 };
+        self.last = newest;
+        Ok(())
+    }
+
+    /// Whether the arm may go on.
+    fn judge(&self) -> Result<(), ArmFault> {
+        let (tick, last) = (self.tick(), &self.last);
+        if let Some(fault) = safety::fault(last.safety_bits, tick) {
+            return Err(fault);
+        }
+        let stopped = |why| Err(ArmFault::WatchdogStop { tick, why });
+        if last.mode != safety::RUNNING {
+            let why = format!("it is {}", safety::mode_words(last.mode));
+            return Err(ArmFault::SafetyFault { tick, why });
+        }
+        if last.runtime != safety::PLAYING {
+            let runtime = safety::runtime_words(last.runtime);
+            let said = self.link.as_ref().map(Link::said).unwrap_or_default();
+            return stopped(format!("our program on the controller is {runtime} ({said})"));
+        }
+        if last.session != self.session {
+            let why = format!("another host shook hands with our script (session {})", last.session);
+            return Err(ArmFault::ConnectionLost { tick, why });
+        }
+        match last.state {
+            state::TIMED_OUT => stopped(format!(
+                "the script heard nothing for more than {} ms while the arm was not at rest",
+                self.settings.watchdog.nanoseconds() / 1_000_000
+            )),
+            state::REFUSED => {
+                let why =
+                    "the script on the controller found the setpoint too far from where the arm is".into();
+                Err(ArmFault::ProtectiveStop { tick, why })
+            }
+            state::HUNG => stopped("the script's moving thread hung, and was ended".into()),
+            _ if self.same_echo > DEAF => {
+                stopped(format!("the script has not echoed a command for {} packages", self.same_echo))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The last word to an arm that failed: it may hear without being heard. Then the script stops by its watchdog
+    /// at the latest.
+    fn last_word(&mut self) {
+        let (sequence, session) = (self.sequence.wrapping_add(1).max(1), self.session);
+        if let Some(link) = &mut self.link {
+            let _ = link.send(&Order { sequence, command: command::STAY, session, setpoint: [0.0; 6] });
+        }
+        self.sequence = sequence;
+        if matches!(self.fault, Some(ArmFault::ConnectionLost { .. })) {
+            self.link = None;
+        }
+    }
+
+    /// Ticks of the controller since we connected.
+    fn tick(&self) -> u64 {
+        u64::try_from(ticks(self.last.timestamp_s) - self.first_tick).unwrap_or(0)
+    }
+
+    /// How old the newest package is at most: the script had our sequence number before it measured. After an absence
+    /// the echo says little, but the package came after the buffer was empty.
+    fn age(&mut self) -> Span {
+        if self.settings.stepped {
+            return Span::ZERO;
+        }
+        let behind = self.sequence.wrapping_sub(self.last.sequence).clamp(0, KEPT as i32 - 1);
+        let echoed = self.sequence.wrapping_sub(behind) as usize % KEPT;
+        let round = self.sent.get(echoed).map_or(Duration::ZERO, Instant::elapsed);
+        let age = match self.emptied {
+            Some(emptied) => round.min(emptied.elapsed() + self.round_trip),
+            None => {
+                self.round_trip = round;
+                round
+            }
+        };
+        let age = Span::from_nanoseconds(i64::try_from(age.as_nanos()).unwrap_or(i64::MAX));
+        self.counts.oldest = self.counts.oldest.max(age);
+        age
+    }
+
+    /// The newest package as everybody else knows it.
+    fn state(&self, commanded: Joints, age: Span) -> State {
+        let last = &self.last;
+        let position = joints(&last.position);
+        let base_from_flange = self.settings.model.forward(&position);
+        State {
+            tick: self.tick(),
+            stamp: Stamp::from_nanoseconds((last.timestamp_s * 1e9).round() as i64),
+            position,
+            velocity: joints(&last.velocity),
+            commanded,
+            wrench: signs::wrench(&last.force, &base_from_flange, &self.settings.flange_from_probe),
+            guiding: last.status_bits & safety::TEACH_BUTTON != 0,
+            safety: safety::of_bits(last.safety_bits).0,
+            age,
+        }
+    }
+
+    /// The command for the script, or why it is none.
+    fn understood(&self, command: &Command) -> Result<(i32, [f64; 6]), ArmFault> {
+        let Command::Position(next) = command else {
+            let code = if *command == Command::Freedrive { command::FREEDRIVE } else { command::STAY };
+            return Ok((code, [0.0; 6]));
+        };
+        let tick = self.tick() + 1;
+        let refused = |why| ArmFault::Refused { tick, why };
+        let setpoint: [f64; 6] = next
+            .as_slice()
+            .try_into()
+            .map_err(|_| refused(format!("it has {} joints and the arm has 6", next.len())))?;
+        if let Some(joint) = next.iter().position(|q| !q.is_finite()) {
+            let why = format!("joint {joint} is {}; send a finite position", next[joint]);
+            return Err(refused(why));
+        }
+        Ok((command::SERVO, setpoint))
+    }
+}
+
+impl Arm for UrArm {
+    fn exchange(&mut self, command: &Command) -> Result<State, ArmFault> {
+        if let Some(fault) = &self.fault {
+            let fault = fault.clone();
+            self.last_word();
+            return Err(fault);
+        }
+        match self.understood(command) {
+            Ok((code, setpoint)) => self.turn(code, setpoint)?,
+            Err(refused) => {
+                self.turn(command::STAY, [0.0; 6])?;
+                return Err(refused);
+            }
+        }
+        let commanded = match command {
+            Command::Position(next) => *next,
+            Command::Freedrive => joints(&self.last.position),
+            Command::Stay => joints(&self.last.target),
+        };
+        let age = self.age();
+        Ok(self.state(commanded, age))
+    }
+
+    fn period(&self) -> Span {
+        TICK
+    }
+
+    fn joints(&self) -> usize {
+        6
+    }
+}
+
+impl Drop for UrArm {
+    fn drop(&mut self) {
+        self.last_word();
+    }
+}
+
+/// The controller's ticks at a time of its clock.
+fn ticks(timestamp_s: f64) -> i64 {
+    (timestamp_s / TICK.seconds()).round() as i64
+}
+
+fn joints(values: &[f64; 6]) -> Joints {
+    let mut all = Joints::zeros(6);
+    for (to, from) in all.as_mut_slice().iter_mut().zip(values) {
+        *to = *from;
+    }
+    all
+}
