@@ -52,9 +52,11 @@ mod model;
 pub mod motion;
 mod observer;
 mod operator;
+pub mod qp;
 pub mod realtime;
 mod recorded;
 mod run;
+pub mod step;
 
 pub use arm::{Arm, ArmFault, Command, Controller, Safety, State};
 pub use black_box::BlackBox;
@@ -67,7 +69,7 @@ pub use guard::{
     probe_place,
 };
 pub use joints::{Joints, MAX_JOINTS, WrongJoints};
-pub use limits::{Limited, Limiter, LimitsError, MotionLimits};
+pub use limits::{JointBound, Limited, Limiter, LimitsError, MotionLimits, Room};
 pub use model::{
     InverseOptions, Jacobian, JointLimit, Mesh, Model, ModelError, ModelWarning, NoInverse, PANDA_URDF,
     UR5E_URDF, Value, Vector6, manipulability,

@@ -8,12 +8,14 @@
 //! of libfranka's `rate_limiting.h`, made exact for the tick's own arithmetic in the private module `axis`).
 
 pub(crate) mod axis;
+mod room;
 
 use probepath_frames::Span;
 use thiserror::Error;
 
 use crate::{Joints, Model};
 use axis::{Bounds, Motion};
+pub use room::{JointBound, Room};
 
 /// How far inside the limits the limiter stays, as a fraction: room for the rounding of the third difference of
 /// positions of some radians (7e-8 of 50 rad/s³ at 1 kHz).
@@ -256,6 +258,12 @@ impl Limiter {
             end[joint] = axis::rest(&self.motion(joint), &self.limits.bounds(joint, self.dt)).at;
         }
         end
+    }
+
+    /// Where `joint` may be commanded next; `None` for a joint that is not there.
+    pub fn room(&self, joint: usize) -> Option<Room> {
+        let there = joint < self.limits.joints();
+        there.then(|| room::of(&self.motion(joint), &self.limits.bounds(joint, self.dt)))
     }
 
     /// Whether the last three commanded positions are the same.

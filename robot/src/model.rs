@@ -7,7 +7,7 @@ mod inverse;
 mod jacobian;
 mod mesh;
 mod newton;
-mod solve;
+pub(crate) mod solve;
 #[cfg(test)]
 mod tests;
 mod text;
@@ -145,7 +145,7 @@ impl Model {
     }
 
     /// The tool's place and Jacobian in one walk along the chain.
-    fn reach(&self, joints: &Joints, flange_from_tool: &Isometry3<f64>) -> Reach {
+    pub(crate) fn reach(&self, joints: &Joints, flange_from_tool: &Isometry3<f64>) -> Reach {
         // A joint turns points about its axis z through o with z × (p - o): the part that does not hold p is summed
         // on the way out, the other once the tool's place p is known.
         let mut turning = [Vector3::zeros(); crate::MAX_JOINTS];
@@ -196,10 +196,10 @@ impl Model {
 }
 
 /// A tool's place in `Base`, and its Jacobian there.
-struct Reach {
-    rotation: Matrix3<f64>,
-    position: Vector3<f64>,
-    jacobian: Jacobian,
+pub(crate) struct Reach {
+    pub(crate) rotation: Matrix3<f64>,
+    pub(crate) position: Vector3<f64>,
+    pub(crate) jacobian: Jacobian,
 }
 
 /// `rotation * Rz(angle)`: only the first two columns change.

@@ -35,7 +35,6 @@ mod arm;
 mod cell;
 pub mod controller;
 mod hand;
-pub mod igtl;
 mod knobs;
 mod leg;
 mod machine;

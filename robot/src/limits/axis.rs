@@ -72,7 +72,7 @@ fn ramp(room: f64, j: f64) -> f64 {
 }
 
 /// The accelerations from which velocity and acceleration stay within their limits for ever.
-fn choices(m: &Motion, b: &Bounds) -> (f64, f64) {
+pub(super) fn choices(m: &Motion, b: &Bounds) -> (f64, f64) {
     let (least, most) = (m.acceleration - b.jerk, m.acceleration + b.jerk);
     let low = (-b.acceleration).max(-ramp(b.velocity + m.velocity, b.jerk));
     let high = b.acceleration.min(ramp(b.velocity - m.velocity, b.jerk));
@@ -138,13 +138,22 @@ pub(crate) fn limit(m: &Motion, b: &Bounds, wanted: f64) -> f64 {
     let (low, high) = choices(m, b);
     let asked = (wanted - m.position) - m.velocity;
     let chosen = asked.clamp(low, high);
+    let safe = safe(m, b, chosen);
+    // Compared as it was copied: nothing was changed on the way.
+    let unchanged = safe.to_bits() == asked.to_bits();
+    if unchanged { wanted } else { m.after(safe).position }
+}
+
+/// The choice nearest to `chosen` (one of the [`choices`]) from which the joint can still come to rest in its range.
+pub(super) fn safe(m: &Motion, b: &Bounds, chosen: f64) -> f64 {
     if is_far_inside(&m.after(chosen), b) {
-        return if (low..=high).contains(&asked) { wanted } else { m.after(chosen).position };
+        return chosen;
     }
     let now = rest(m, b);
     if is_safe(m, b, chosen, &now) {
-        return if (low..=high).contains(&asked) { wanted } else { m.after(chosen).position };
+        return chosen;
     }
+    let (low, high) = choices(m, b);
     let (mut safe, mut unsafe_) = (brake(m, b).clamp(low, high), chosen);
     for _ in 0..HALVINGS {
         let middle = (safe + unsafe_) / 2.0;
@@ -154,5 +163,5 @@ pub(crate) fn limit(m: &Motion, b: &Bounds, wanted: f64) -> f64 {
             unsafe_ = middle;
         }
     }
-    m.after(safe).position
+    safe
 }

@@ -7,9 +7,17 @@ use crate::{Joints, MAX_JOINTS};
 
 /// What is missing from a tool's place to the goal, as the small motion in `Base`'s axes that would make it up:
 /// linear (m), then a rotation vector (rad).
-pub(super) fn missing(reach: &Reach, goal: &Isometry3<f64>, goal_rotation: &Matrix3<f64>) -> Vector6 {
+pub(crate) fn missing(reach: &Reach, goal: &Isometry3<f64>, goal_rotation: &Matrix3<f64>) -> Vector6 {
     let linear = goal.translation.vector - reach.position;
     let angular = rotation_vector(&(goal_rotation * reach.rotation.transpose()));
+    Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
+}
+
+/// The small motion in `Base`'s axes from one pose to another, as [`missing`].
+pub(crate) fn between(from: &Isometry3<f64>, to: &Isometry3<f64>) -> Vector6 {
+    let linear = to.translation.vector - from.translation.vector;
+    let turned = (to.rotation * from.rotation.inverse()).to_rotation_matrix();
+    let angular = rotation_vector(turned.matrix());
     Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z)
 }
 
@@ -29,7 +37,7 @@ fn rotation_vector(r: &Matrix3<f64>) -> Vector3<f64> {
 /// ([`Wampler 1986`], `Jᵀ (J Jᵀ + damping)⁻¹`); `None` when the system cannot be solved.
 ///
 /// [`Wampler 1986`]: https://doi.org/10.1109/TSMC.1986.289285
-pub(super) fn least_step(jacobian: &Jacobian, motion: &Vector6, damping: f64) -> Option<Joints> {
+pub(crate) fn least_step(jacobian: &Jacobian, motion: &Vector6, damping: f64) -> Option<Joints> {
     let j = &jacobian.matrix;
     let step: SVector<f64, MAX_JOINTS> = if jacobian.len >= 6 {
         let normal = j * j.transpose() + SMatrix::<f64, 6, 6>::identity() * damping;
