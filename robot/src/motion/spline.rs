@@ -47,7 +47,13 @@ impl<const D: usize> Spline<D> {
     pub fn at(&self, u: f64) -> Jet<D> {
         let u = u.clamp(0.0, self.end());
         let piece = ((u / self.step) as usize).min(self.knots.len() - 2);
-        let (h, right) = (self.step, u - self.step * piece as f64);
+        self.on(piece, u - self.step * piece as f64)
+    }
+
+    /// Value and derivatives in one piece, `right` of its beginning: at a knot the third derivative jumps, and a
+    /// piece has its own.
+    pub(crate) fn on(&self, piece: usize, right: f64) -> Jet<D> {
+        let h = self.step;
         let left = h - right;
         let (k0, k1) = (&self.knots[piece], &self.knots[piece + 1]);
         let (m0, m1) = (&self.bends[piece], &self.bends[piece + 1]);

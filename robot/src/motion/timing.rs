@@ -1,4 +1,4 @@
-//! Timing along a path: how fast, where, so that every joint keeps its limits.
+//! Timing along a path: the fastest motion that keeps every joint's limits, and its clock.
 //!
 //! With joints `q(s)` over the length `s` of the path, and `'` for `d/ds`:
 //!
@@ -8,23 +8,40 @@
 //! jerk          q' j + 3 q'' v a + q''' v^3
 //! ```
 //!
-//! [`PathLimits`] turns the joints' limits into a highest speed at every place and one acceleration and jerk of `s`
-//! for the whole path; [`PathClock`] moves `s` as fast as these allow, tick by tick, and looks ahead only as far as it
-//! takes to slow down: local, deterministic, no heap in a step. Slowing down, pausing and resuming change the speed
-//! along the path, nothing else: `s` never goes back, and what is commanded lies on the path.
+//! [`PathLimits`] finds the fastest speed over the distance within the joints' limits and those of the path itself
+//! (the private module `fastest`), and holds it against the limits everywhere, between the postures too (`check`).
+//! [`PathClock`] follows that motion tick by tick, no heap in a step. Slower, pause and resume scale its time: `s`
+//! never goes back, what is commanded lies on the path, and no limit is crossed on the way (`clock`).
 
+mod bands;
+mod check;
+mod clock;
+mod fastest;
+mod grid;
+mod profile;
 mod ramp;
+mod way;
 
 use thiserror::Error;
 
-use crate::{Joints, MotionLimits};
-use ramp::{Bounds, Rate};
+pub use clock::PathClock;
 
-/// Parts of a joint's limit: of the acceleration, for `q'' v^2` and `q' a`; of the jerk, for its three terms.
-const HALF: f64 = 0.5;
-const THIRD: f64 = 1.0 / 3.0;
-/// Part of the velocity limit: between two postures the slope is a little more than at either (measured: 0.4 %).
-const INSIDE: f64 = 0.98;
+use crate::{Joints, MotionLimits};
+use fastest::{Fastest, Start};
+use profile::{Launch, Profile};
+use ramp::{Bounds, Rate};
+use way::Way;
+
+/// Part of the joints' accelerations and jerks that the motion uses: what is left lets an operator slow it down
+/// wherever it is.
+const RESERVE: f64 = 0.995;
+/// How often the fastest motion is looked for again, with what the check found taken off where it found it.
+const ROUNDS: usize = 3;
+/// A cell this near to its limits needs no further look.
+const NEAR: f64 = 1.001;
+/// On line the path is slowed down with up to so many times its own acceleration and jerk: a stop should be quick.
+const BRAKE: (f64, f64) = (5.0, 10.0);
+
 /// How the path is to be driven, besides the joints' limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathSpeed {
@@ -69,20 +86,53 @@ pub enum TimingError {
     },
 }
 
-/// How fast the path may be driven, place by place.
+/// The shares of limits that a motion uses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct MotionBounds {
+    velocity: f64,
+    acceleration: f64,
+    jerk: f64,
+}
+
+impl MotionBounds {
+    const ONE: Self = Self { velocity: 1.0, acceleration: 1.0, jerk: 1.0 };
+
+    const fn max(&self, other: &Self) -> Self {
+        Self {
+            velocity: self.velocity.max(other.velocity),
+            acceleration: self.acceleration.max(other.acceleration),
+            jerk: self.jerk.max(other.jerk),
+        }
+    }
+
+    /// How many times slower the motion would have to be to keep them.
+    fn slower(&self) -> f64 {
+        self.velocity.max(self.acceleration.sqrt()).max(self.jerk.cbrt())
+    }
+
+    /// Limits that were found crossed here are asked to be kept by as much more; others are left.
+    const fn tighten(&mut self, found: &Self) {
+        self.velocity *= found.velocity.max(1.0);
+        self.acceleration *= found.acceleration.max(1.0);
+        self.jerk *= found.jerk.max(1.0);
+    }
+}
+
+/// How fast the path is driven: the fastest motion from rest to rest along it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PathLimits {
     step: f64,
-    /// Highest speed at each posture (m/s).
+    /// Highest steady speed at each posture (m/s).
     speeds: Vec<f64>,
-    bounds: (f64, f64),
+    wanted: PathSpeed,
+    /// What slowing down on line may use.
+    brake: PathSpeed,
+    way: Way,
+    profile: Profile,
 }
 
 impl PathLimits {
-    /// From the `postures` along the path, `step` metres apart, and the joints' limits.
-    ///
-    /// The derivatives are differences of neighbouring postures, the largest of three neighbours, because between
-    /// postures they may be larger than at them.
+    /// From the `postures` along the path, `step` metres apart, the joints' limits, and the path's own.
     ///
     /// # Errors
     /// When there are fewer than four postures, one does not fit the limits, or a number is not above zero.
@@ -92,22 +142,16 @@ impl PathLimits {
         limits: &MotionLimits,
         wanted: PathSpeed,
     ) -> Result<Self, TimingError> {
+        let way = checked(step, postures, limits, &wanted)?;
+        let speeds = (0..postures.len()).map(|i| {
+            let piece = i.min(postures.len() - 2);
+            way.steady(&way.on(piece, step * (i - piece) as f64), wanted.speed)
+        });
+        let speeds: Vec<f64> = speeds.collect();
+        let profile = fastest(&way.within(RESERVE), &wanted, &speeds);
         let PathSpeed { speed, acceleration, jerk } = wanted;
-        for (name, value) in
-            [("step", step), ("speed", speed), ("acceleration", acceleration), ("jerk", jerk)]
-        {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(TimingError::NotPositive { name, value });
-            }
-        }
-        if postures.len() < 4 {
-            return Err(TimingError::TooFew { found: postures.len() });
-        }
-        let fits = |q: &Joints| q.len() == limits.velocity.len() && q.is_finite();
-        if let Some(index) = postures.iter().position(|q| !fits(q)) {
-            return Err(TimingError::Posture { index });
-        }
-        Ok(Self::of(step, &slopes(step, postures), limits, wanted))
+        let brake = PathSpeed { speed, acceleration: BRAKE.0 * acceleration, jerk: BRAKE.1 * jerk };
+        Ok(Self { step, speeds, wanted, brake, way, profile })
     }
 
     /// The same speed over `length`, whatever moves along it: for the time of a motion that is already planned, in
@@ -119,29 +163,11 @@ impl PathLimits {
         let still = Joints::zeros(0);
         let limits =
             MotionLimits { lower: still, upper: still, velocity: still, acceleration: still, jerk: still };
-        Self::new(length / 3.0, &[still; 4], &limits, wanted)
-    }
-
-    fn of(step: f64, slopes: &[Slope], limits: &MotionLimits, wanted: PathSpeed) -> Self {
-        let steepest = slopes.iter().fold(wanted, |least, slope| PathSpeed {
-            acceleration: least.acceleration.min(HALF * least_of(&limits.acceleration, &slope[0])),
-            jerk: least.jerk.min(THIRD * least_of(&limits.jerk, &slope[0])),
-            ..least
-        });
-        let PathSpeed { acceleration, jerk, .. } = steepest;
-        let speeds = slopes.iter().map(|slope| {
-            let bends = |power: f64, part: f64, limit: &Joints, slope: &Joints| {
-                (part * least_of(limit, slope)).powf(1.0 / power)
-            };
-            wanted
-                .speed
-                .min(INSIDE * least_of(&limits.velocity, &slope[0]))
-                .min(bends(2.0, HALF, &limits.acceleration, &slope[1]))
-                .min(bends(3.0, THIRD, &limits.jerk, &slope[2]))
-                // 3 q'' v a <= jerk / 3
-                .min(THIRD * THIRD * least_of(&limits.jerk, &slope[1]) / acceleration)
-        });
-        Self { step, speeds: speeds.collect(), bounds: (acceleration, jerk) }
+        let step = length / 3.0;
+        let way = checked(step, &[still; 4], &limits, &wanted)?;
+        let PathSpeed { speed, acceleration, jerk } = wanted;
+        let profile = Profile::uniform(length, speed, acceleration, jerk);
+        Ok(Self { step, speeds: vec![speed; 4], wanted, brake: wanted, way, profile })
     }
 
     /// The path's length (m).
@@ -149,23 +175,29 @@ impl PathLimits {
         self.step * (self.speeds.len() - 1) as f64
     }
 
-    /// The highest speed at `s` (m/s): the lower of the two neighbours'.
+    /// How long the motion takes at full speed (s).
+    pub const fn duration_s(&self) -> f64 {
+        self.profile.duration
+    }
+
+    /// The highest steady speed at `s` (m/s), the lower of the two neighbours': what the limits allow there when the
+    /// speed does not change. Just before and after a slower place the motion is slower than that.
     pub fn speed_at(&self, s: f64) -> f64 {
         let place = s.max(0.0) / self.step;
         let (below, above) = (place.floor() as usize, place.ceil() as usize);
         self.at(below).min(self.at(above))
     }
 
-    /// The slowest place, as distance along the path (m) and speed there (m/s).
+    /// The place of the lowest steady speed, as distance along the path (m) and speed there (m/s).
     pub fn slowest(&self) -> (f64, f64) {
         let first = (0.0, f64::INFINITY);
         let of = self.speeds.iter().enumerate().map(|(i, v)| (i as f64 * self.step, *v));
         of.fold(first, |least, here| if here.1 < least.1 { here } else { least })
     }
 
-    /// Acceleration (m/s^2) and jerk (m/s^3) along the path.
-    pub const fn acceleration_and_jerk(&self) -> (f64, f64) {
-        self.bounds
+    /// The path's own limits.
+    pub const fn wanted(&self) -> &PathSpeed {
+        &self.wanted
     }
 
     /// Past the last posture there is nowhere to go.
@@ -174,48 +206,71 @@ impl PathLimits {
     }
 }
 
-/// The largest first three derivatives of every joint around one posture.
-type Slope = [Joints; 3];
-
-fn slopes(step: f64, postures: &[Joints]) -> Vec<Slope> {
-    let last = postures.len() - 1;
-    // Ends are repeated, as they are at rest.
-    let at = |i: isize| &postures[i.clamp(0, last as isize) as usize];
-    let combine = |terms: &[(isize, f64)], i: isize, scale: f64| {
-        let zero = Joints::zeros(postures[0].len());
-        terms
-            .iter()
-            .fold(zero, |sum, (off, w)| sum.zip(at(i + off), |a, b| a + w * b))
-            .map(|x| (x / scale).abs())
-    };
-    // Four postures at least: there is always room from one after the first to two before the last.
-    let edge = |i: isize, room: isize| i.clamp(1, last as isize - room);
-    let own: Vec<Slope> = (0..=last as isize)
-        .map(|i| {
-            [
-                combine(&[(-1, -1.0), (1, 1.0)], edge(i, 1), 2.0 * step),
-                combine(&[(-1, 1.0), (0, -2.0), (1, 1.0)], edge(i, 1), step * step),
-                combine(&[(-1, -1.0), (0, 3.0), (1, -3.0), (2, 1.0)], edge(i, 2), step.powi(3)),
-            ]
-        })
-        .collect();
-    (0..=last)
-        .map(|i| {
-            let around = &own[i.saturating_sub(1)..=(i + 1).min(last)];
-            let largest = |order: usize| {
-                around.iter().fold(Joints::zeros(postures[0].len()), |most, s| most.zip(&s[order], f64::max))
-            };
-            [largest(0), largest(1), largest(2)]
-        })
-        .collect()
+/// The joints' way, when all the numbers can be.
+fn checked(
+    step: f64,
+    postures: &[Joints],
+    limits: &MotionLimits,
+    wanted: &PathSpeed,
+) -> Result<Way, TimingError> {
+    let PathSpeed { speed, acceleration, jerk } = *wanted;
+    for (name, value) in [("step", step), ("speed", speed), ("acceleration", acceleration), ("jerk", jerk)] {
+        if !(value.is_finite() && value > 0.0) {
+            return Err(TimingError::NotPositive { name, value });
+        }
+    }
+    let too_few = TimingError::TooFew { found: postures.len() };
+    if postures.len() < 4 {
+        return Err(too_few);
+    }
+    let fits = |q: &Joints| q.len() == limits.velocity.len() && q.is_finite();
+    if let Some(index) = postures.iter().position(|q| !fits(q)) {
+        return Err(TimingError::Posture { index });
+    }
+    let rates = [("velocity", limits.velocity), ("acceleration", limits.acceleration), ("jerk", limits.jerk)];
+    for (name, rate) in rates {
+        if let Some(value) = rate.iter().find(|value| !(value.is_finite() && *value > 0.0)) {
+            return Err(TimingError::NotPositive { name, value });
+        }
+    }
+    Way::through(step, postures, limits).ok_or(too_few)
 }
 
-/// The least of `limit / slope` over the joints; infinite where nothing moves.
-fn least_of(limit: &Joints, slope: &Joints) -> f64 {
-    limit
-        .zip(slope, |limit, slope| if slope > 0.0 { limit / slope } else { f64::INFINITY })
-        .iter()
-        .fold(f64::INFINITY, f64::min)
+/// The fastest motion, checked: where the check finds a limit crossed between the places that were asked, it is
+/// looked for again with that limit tightened there; what is left is taken off the whole motion's speed, which keeps
+/// every limit, because velocity, acceleration and jerk fall with its first, second and third power.
+fn fastest(way: &Way, wanted: &PathSpeed, speeds: &[f64]) -> Profile {
+    let grid = grid::Grid::new(way, wanted, speeds);
+    let mut tight = vec![MotionBounds::ONE; grid.nodes.len() - 1];
+    let slow = Profile::new(&grid.nodes, &grid.control, grid.launch, grid.landing);
+    let mut best = (slower(&check::used(way, &slow, wanted)), slow);
+    let (mut control, mut start) = (grid.control.clone(), Start::Cold);
+    for _ in 0..=ROUNDS {
+        control = Fastest::new(&grid.nodes, way, wanted, &tight, control, start).solve();
+        start = Start::Warm;
+        let profile = Profile::new(&grid.nodes, &control, grid.launch, grid.landing);
+        let used = check::used(way, &profile, wanted);
+        let by = slower(&used);
+        // What is no number is no motion.
+        if profile.duration * by < best.0 * best.1.duration {
+            best = (by, profile);
+        }
+        if by < NEAR {
+            break;
+        }
+        for (cell, used) in tight.iter_mut().zip(&used[1..]) {
+            cell.tighten(used);
+        }
+    }
+    let (by, mut profile) = best;
+    profile.scale(1.0 / by);
+    profile
+}
+
+/// How many times slower a motion would have to be.
+fn slower(used: &[MotionBounds]) -> f64 {
+    let worse = |a: f64, b: f64| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) };
+    used.iter().fold(0.0, |most, used| worse(most, used.slower()))
 }
 
 /// One speed that follows a wanted one as quickly as its bounds on acceleration and jerk allow, in closed form.
@@ -239,127 +294,6 @@ impl SpeedRamp {
         let (way, rate) = ramp::after(&self.rate, target, &self.bounds, dt);
         self.rate = rate;
         way / dt
-    }
-}
-
-/// Where along the path the motion is; moved on by one tick at a time.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PathClock {
-    limits: PathLimits,
-    s: f64,
-    rate: Rate,
-    bounds: Bounds,
-    /// Slowing down for a place ahead: the speed there (m/s), and the place (m). Kept until the place is passed, so
-    /// that the jerk does not alternate on the way.
-    slowing: Option<(f64, f64)>,
-}
-
-impl PathClock {
-    /// At rest at the start.
-    pub const fn new(limits: PathLimits) -> Self {
-        let bounds = Bounds { acceleration: limits.bounds.0, jerk: limits.bounds.1 };
-        Self { limits, s: 0.0, rate: Rate { speed: 0.0, acceleration: 0.0 }, bounds, slowing: None }
-    }
-
-    /// Moves on by one tick of `dt` seconds, at `wanted` m/s where the path allows it (zero: slow down to rest, and
-    /// wait), and gives the distance along the path (m). Speeds below zero, and NaN, count as zero.
-    pub fn step(&mut self, wanted: f64, dt: f64) -> f64 {
-        let wanted = if wanted > 0.0 { wanted } else { 0.0 };
-        if self.slowing.is_some_and(|(_, place)| self.s >= place) {
-            self.slowing = None;
-        }
-        let mut target = wanted.min(self.limits.speed_at(self.s));
-        if let Some((speed, _)) = self.slowing {
-            target = target.min(speed);
-        }
-        let (mut way, mut rate) = ramp::after(&self.rate, target, &self.bounds, dt);
-        while let Some((speed, place)) = self.too_fast(self.s + way, &rate, target) {
-            self.slowing = Some((speed, place));
-            let slow = ramp::after(&self.rate, speed, &self.bounds, dt);
-            (way, rate) = self.just_in_time((way, rate), slow, target.min(speed), place, dt);
-            target = speed;
-        }
-        // Rounding must not turn it round.
-        self.s = (self.s + way.max(0.0)).min(self.limits.length());
-        self.rate = Rate { speed: rate.speed.max(0.0), ..rate };
-        self.s
-    }
-
-    /// The latest tick from which the `place` ahead can still be slowed down for: between the `fast` one, which is too
-    /// late, and the `slow` one. What lies between two ticks within the bounds is within them. A whole tick too early
-    /// would stop more than a millimetre short of the end when driven hard.
-    fn just_in_time(
-        &self,
-        fast: (f64, Rate),
-        slow: (f64, Rate),
-        speed: f64,
-        place: f64,
-        dt: f64,
-    ) -> (f64, Rate) {
-        let between = |part: f64| {
-            let of = |slow: f64, fast: f64| slow + part * (fast - slow);
-            let rate = Rate {
-                speed: of(slow.1.speed, fast.1.speed),
-                acceleration: of(slow.1.acceleration, fast.1.acceleration),
-            };
-            (of(slow.0, fast.0), rate)
-        };
-        // A nanometre is kept for rounding, and for the speed that a tick still has at the place.
-        let in_time = |tick: &(f64, Rate)| {
-            self.s + tick.0 + ramp::distance(&tick.1, speed, &self.bounds) + speed * dt < place - 1e-9
-        };
-        let (mut early, mut late) = (0.0, 1.0);
-        for _ in 0..30 {
-            let middle = 0.5 * (early + late);
-            if in_time(&between(middle)) {
-                early = middle;
-            } else {
-                late = middle;
-            }
-        }
-        between(early)
-    }
-
-    /// The first place ahead that is slower than `target` and could not be slowed down for any more from `s` and
-    /// `rate`: its speed and place.
-    fn too_fast(&self, s: f64, rate: &Rate, target: f64) -> Option<(f64, f64)> {
-        let stop = ramp::distance(rate, 0.0, &self.bounds);
-        let from = (s / self.limits.step).ceil() as usize;
-        let until = (((s + stop) / self.limits.step).ceil() as usize).min(self.limits.speeds.len() - 1);
-        (from..=until).find_map(|k| {
-            let place = k as f64 * self.limits.step;
-            let end = k + 1 == self.limits.speeds.len();
-            let speed = if end { 0.0 } else { self.limits.at(k) };
-            let late = speed < target && ramp::distance(rate, speed, &self.bounds) > place - s;
-            late.then_some((speed, place))
-        })
-    }
-
-    /// Distance along the path (m).
-    pub const fn at(&self) -> f64 {
-        self.s
-    }
-
-    /// Speed along the path (m/s).
-    pub const fn speed(&self) -> f64 {
-        self.rate.speed
-    }
-
-    /// Whether it rests.
-    pub fn is_at_rest(&self) -> bool {
-        self.rate == Rate::default()
-    }
-
-    /// Whether it has arrived: at rest, after slowing down for the end, of which it stops short by less than 0.05 mm.
-    pub fn has_arrived(&self) -> bool {
-        let end = self.limits.length() - HALF * self.limits.step;
-        self.is_at_rest()
-            && (self.s >= self.limits.length() || self.slowing.is_some_and(|(_, place)| place > end))
-    }
-
-    /// The limits it keeps.
-    pub const fn limits(&self) -> &PathLimits {
-        &self.limits
     }
 }
 

@@ -50,16 +50,38 @@ pub(super) fn after(rate: &Rate, target: f64, bounds: &Bounds, seconds: f64) -> 
     (way + target * left, Rate { speed: target, acceleration: 0.0 })
 }
 
-/// The way it takes to change to `target`.
-pub(super) fn distance(rate: &Rate, target: f64, bounds: &Bounds) -> f64 {
-    let duration: f64 = parts(rate, target, bounds).iter().map(|(_, seconds)| seconds).sum();
-    after(rate, target, bounds, duration).0
+/// How long it takes to change to `target` (s).
+pub(super) fn lasts(rate: &Rate, target: f64, bounds: &Bounds) -> f64 {
+    parts(rate, target, bounds).iter().map(|(_, seconds)| seconds).sum()
+}
+
+/// How far a change from rest to rest gets in so many seconds.
+pub(super) fn reach(bounds: &Bounds, seconds: f64) -> f64 {
+    let peak = bounds.acceleration.min(0.5 * bounds.jerk * seconds);
+    peak * (seconds - peak / bounds.jerk)
+}
+
+/// The jerk so many seconds into the change.
+pub(super) fn jerk_at(rate: &Rate, target: f64, bounds: &Bounds, seconds: f64) -> f64 {
+    let mut left = seconds;
+    for (jerk, lasts) in parts(rate, target, bounds) {
+        if left < lasts {
+            return jerk;
+        }
+        left -= lasts;
+    }
+    0.0
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    /// The way it takes to change to `target`.
+    fn distance(rate: &Rate, target: f64, bounds: &Bounds) -> f64 {
+        after(rate, target, bounds, lasts(rate, target, bounds)).0
+    }
 
     proptest! {
         #![proptest_config(ProptestConfig { cases: 5000, rng_seed: proptest::test_runner::RngSeed::Fixed(1), failure_persistence: None, ..ProptestConfig::default() })]

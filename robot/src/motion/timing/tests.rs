@@ -116,8 +116,8 @@ fn a_straight_path_is_driven_at_the_wanted_speed_with_one_ramp_at_either_end() {
     let seconds = places.len() as f64 * DT;
     assert!(limits.length() - places[places.len() - 1] < 0.05e-3);
     // 200 mm at 10 mm/s, and what the ramps lose: 2 x half of 0.1 s.
-    assert!((seconds - 20.1).abs() < 0.02, "{seconds}");
-    let cruising = places.windows(2).filter(|p| ((p[1] - p[0]) / DT - 0.01).abs() < 1e-9).count();
+    assert!((seconds - 20.1).abs() < 0.04, "{seconds}");
+    let cruising = places.windows(2).filter(|p| ((p[1] - p[0]) / DT - 0.01).abs() < 2e-6).count();
     assert!(cruising as f64 * DT > 19.85, "{cruising}");
 }
 
