@@ -68,7 +68,7 @@ pub struct PlanReport {
     pub slowest: (f64, f64),
     /// How long the approach takes, without pauses (s).
     pub approach_s: f64,
-    /// How long the path takes, without pauses (s), ramps left out.
+    /// How long the path takes, without pauses (s).
     pub path_s: f64,
 }
 
@@ -116,9 +116,7 @@ impl Plan {
         let report = PlanReport {
             slowest: timing.slowest(),
             approach_s: legs.iter().map(Leg::duration_s).sum(),
-            path_s: (0..postures.len())
-                .map(|i| path.spacing() / timing.speed_at(i as f64 * path.spacing()))
-                .sum(),
+            path_s: timing.duration_s(),
             ..tour.report
         };
         refuse_crawling(&report, settings)?;

@@ -34,11 +34,13 @@ use way::Way;
 
 /// Part of the joints' accelerations and jerks that the motion uses: what is left lets an operator slow it down
 /// wherever it is.
-const RESERVE: f64 = 0.995;
+const RESERVE: (f64, f64) = (0.995, 0.98);
 /// How often the fastest motion is looked for again, with what the check found taken off where it found it.
 const ROUNDS: usize = 3;
 /// A cell this near to its limits needs no further look.
 const NEAR: f64 = 1.001;
+/// How much more than what was found is taken off.
+const EAGER: f64 = 1.3;
 /// On line the path is slowed down with up to so many times its own acceleration and jerk: a stop should be quick.
 const BRAKE: (f64, f64) = (5.0, 10.0);
 
@@ -111,10 +113,11 @@ impl MotionBounds {
     }
 
     /// Limits that were found crossed here are asked to be kept by as much more; others are left.
-    const fn tighten(&mut self, found: &Self) {
-        self.velocity *= found.velocity.max(1.0);
-        self.acceleration *= found.acceleration.max(1.0);
-        self.jerk *= found.jerk.max(1.0);
+    fn tighten(&mut self, found: &Self) {
+        let more = |share: f64| if share > 1.0 { 1.0 + EAGER * (share - 1.0) } else { 1.0 };
+        self.velocity *= more(found.velocity);
+        self.acceleration *= more(found.acceleration);
+        self.jerk *= more(found.jerk);
     }
 }
 

@@ -33,8 +33,9 @@ const TRIES: u8 = 3;
 /// part of them.
 const LOOKS: usize = 100;
 const PART: f64 = 0.8;
-/// Part of the limits that a change may use.
-const WITHIN: f64 = 0.9995;
+/// Part of the limits of acceleration and jerk that a change may use: where the motion's jerk jumps it may be a little
+/// more just before than at the half ticks that are looked at.
+const WITHIN: (f64, f64) = (0.9995, 0.99);
 
 /// Where along the path the motion is; moved on by one tick at a time.
 #[derive(Clone, Debug, PartialEq)]
@@ -147,7 +148,7 @@ impl PathClock {
         let half = 0.5 * dt;
         let mut cell = self.cell;
         let mut bend = ramp::jerk_at(&self.pace, *target, bounds, 0.5 * half);
-        (1..=2 * looks).all(|k| {
+        (0..=2 * looks).all(|k| {
             let seconds = half * k as f64;
             let (way, pace) = ramp::after(&self.pace, *target, bounds, seconds);
             let (place, motion) = self.limits.profile.at(self.time + way, &mut cell);
@@ -167,7 +168,7 @@ impl PathClock {
         within
             && both.iter().take(if bends[0].to_bits() == bends[1].to_bits() { 1 } else { 2 }).all(|motion| {
                 let [velocity, acceleration, jerk] = way.shares(&slopes, motion);
-                velocity <= 1.0 && acceleration.max(jerk) <= WITHIN && motion.share(most) <= 1.0
+                velocity <= 1.0 && acceleration <= WITHIN.0 && jerk <= WITHIN.1 && motion.share(most) <= 1.0
             })
     }
 

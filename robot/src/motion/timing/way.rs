@@ -32,10 +32,10 @@ impl Way {
         Some(Self { joints: limits.joints(), spline, per })
     }
 
-    /// The same way with so much less of the accelerations and jerks.
-    pub(super) fn within(&self, part: f64) -> Self {
+    /// The same way with only these parts of the accelerations and jerks.
+    pub(super) fn within(&self, (of_acceleration, of_jerk): (f64, f64)) -> Self {
         let [velocity, acceleration, jerk] = self.per;
-        Self { per: [velocity, acceleration / part, jerk / part], ..self.clone() }
+        Self { per: [velocity, acceleration / of_acceleration, jerk / of_jerk], ..self.clone() }
     }
 
     /// How many joints.
