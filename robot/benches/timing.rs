@@ -18,7 +18,14 @@ const STEP: f64 = 0.0005;
 fn taught(i: usize) -> Joints {
     let s = STEP * i as f64;
     let mut joints = Joints::zeros(6);
-    let swings = [(1.2, 0.05, 0.31), (-0.9, 0.04, 0.23), (1.5, 0.06, 0.41), (0.4, 0.08, 0.17), (-1.1, 0.03, 0.13), (0.7, 0.1, 0.53)];
+    let swings = [
+        (1.2, 0.05, 0.31),
+        (-0.9, 0.04, 0.23),
+        (1.5, 0.06, 0.41),
+        (0.4, 0.08, 0.17),
+        (-1.1, 0.03, 0.13),
+        (0.7, 0.1, 0.53),
+    ];
     for (joint, (slope, swing, wave)) in swings.into_iter().enumerate() {
         joints[joint] = slope * s + swing * (s / wave * std::f64::consts::TAU + joint as f64).sin();
     }
@@ -27,7 +34,13 @@ fn taught(i: usize) -> Joints {
 
 fn limits() -> MotionLimits {
     let all = |value| Joints::splat(6, value);
-    MotionLimits { lower: all(-9.0), upper: all(9.0), velocity: all(1.5), acceleration: all(5.0), jerk: all(100.0) }
+    MotionLimits {
+        lower: all(-9.0),
+        upper: all(9.0),
+        velocity: all(1.5),
+        acceleration: all(5.0),
+        jerk: all(100.0),
+    }
 }
 
 fn timing(criterion: &mut Criterion) {

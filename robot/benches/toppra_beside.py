@@ -3,6 +3,7 @@ acceleration 5 for every joint. It knows no jerk, so its motion is quicker than 
 
 import sys
 import time
+from importlib.metadata import version
 
 import numpy as np
 import toppra as ta
@@ -27,7 +28,7 @@ for count in (1000, len(points)):
         trajectory = found.compute_trajectory()
         took.append(time.perf_counter() - start)
     print(
-        f"toppra {ta.__version__}, {count} grid points: {np.median(took) * 1e3:.1f} ms (median of 5), "
+        f"toppra {version("toppra")}, {count} grid points: {np.median(took) * 1e3:.1f} ms (median of 5), "
         f"the motion takes {trajectory.duration:.3f} s without a jerk limit",
         file=sys.stderr,
     )

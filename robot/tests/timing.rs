@@ -89,7 +89,8 @@ impl Problem {
             [&self.limits.velocity, &self.limits.acceleration, &self.limits.jerk].into_iter().enumerate()
         {
             rows = rows.windows(2).map(|p| p[1].zip(&p[0], |a, b| (a - b) / DT)).collect();
-            shares[order] = rows.iter().map(|row| row.zip(limit, |x, most| x / most).largest()).fold(0.0, f64::max);
+            shares[order] =
+                rows.iter().map(|row| row.zip(limit, |x, most| x / most).largest()).fold(0.0, f64::max);
         }
         (shares, seconds)
     }

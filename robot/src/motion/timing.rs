@@ -43,6 +43,8 @@ const NEAR: f64 = 1.001;
 const EAGER: f64 = 1.3;
 /// On line the path is slowed down with up to so many times its own acceleration and jerk: a stop should be quick.
 const BRAKE: (f64, f64) = (5.0, 10.0);
+/// The same where no joints are known that would say when it is too much.
+const BRAKE_UNIFORM: f64 = 2.0;
 
 /// How the path is to be driven, besides the joints' limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -158,7 +160,7 @@ impl PathLimits {
     }
 
     /// The same speed over `length`, whatever moves along it: for the time of a motion that is already planned, in
-    /// seconds for metres.
+    /// seconds for metres. Slowing down on line may take up to twice the acceleration and jerk.
     ///
     /// # Errors
     /// When a number is not above zero.
@@ -170,7 +172,8 @@ impl PathLimits {
         let way = checked(step, &[still; 4], &limits, &wanted)?;
         let PathSpeed { speed, acceleration, jerk } = wanted;
         let profile = Profile::uniform(length, speed, acceleration, jerk);
-        Ok(Self { step, speeds: vec![speed; 4], wanted, brake: wanted, way, profile })
+        let brake = PathSpeed { speed, acceleration: BRAKE_UNIFORM * acceleration, jerk: BRAKE_UNIFORM * jerk };
+        Ok(Self { step, speeds: vec![speed; 4], wanted, brake, way, profile })
     }
 
     /// The path's length (m).

@@ -64,8 +64,10 @@ fn part(
     let velocity = largest(&first, per_v) * fastest;
     let acceleration = [
         (first[0] * g[0]) * 0.5 + second[0] * b[0],
-        (first[0] * g[1] + first[1] * (2.0 * g[0])) / 6.0 + (second[1] * b[0] + second[0] * (2.0 * b[1])) / 3.0,
-        (first[1] * (2.0 * g[1]) + first[2] * g[0]) / 6.0 + (second[1] * (2.0 * b[1]) + second[0] * b[2]) / 3.0,
+        (first[0] * g[1] + first[1] * (2.0 * g[0])) / 6.0
+            + (second[1] * b[0] + second[0] * (2.0 * b[1])) / 3.0,
+        (first[1] * (2.0 * g[1]) + first[2] * g[0]) / 6.0
+            + (second[1] * (2.0 * b[1]) + second[0] * b[2]) / 3.0,
         (first[2] * g[1]) * 0.5 + second[1] * b[2],
     ];
     let middle = (second[0] * g[1] + second[1] * g[0]) * 0.5;

@@ -120,7 +120,12 @@ impl<'a> Fastest<'a> {
         let [velocity, acceleration, jerk] = way.per();
         let top = wanted.speed.min(1.0 / first.component_mul(velocity).amax()) / tight.velocity;
         let rows = self.limits.len();
-        self.places.push(Place { at: cell, basis: basis(self.nodes, cell, part * h), fastest: top * top, rows });
+        self.places.push(Place {
+            at: cell,
+            basis: basis(self.nodes, cell, part * h),
+            fastest: top * top,
+            rows,
+        });
         let mut add = |row: [f64; 3], is_jerk: bool| {
             self.limits.push(Limit { row, is_jerk, slack: [1.0; 2], dual: [1.0; 2] });
         };
@@ -205,8 +210,7 @@ impl<'a> Fastest<'a> {
     /// The sum of slack times dual.
     fn gap(&self) -> f64 {
         let tops: f64 = self.tops.iter().map(|(s, z)| s * z).sum();
-        let limits: f64 =
-            self.limits.iter().map(|l| l.slack[0] * l.dual[0] + l.slack[1] * l.dual[1]).sum();
+        let limits: f64 = self.limits.iter().map(|l| l.slack[0] * l.dual[0] + l.slack[1] * l.dual[1]).sum();
         tops + limits
     }
 

@@ -4,7 +4,7 @@ use super::way::Way;
 use super::{Launch, PathSpeed};
 
 /// Cells in the middle of the path: as many as postures, within these.
-const CELLS: (usize, usize) = (300, 1000);
+const CELLS: (usize, usize) = (300, 700);
 /// The launch takes this part of the time in which a full jerk reaches the first of the other limits.
 const LAUNCH: f64 = 0.04;
 /// After it each cell takes this much more time than the last, at a constant jerk.
@@ -30,7 +30,8 @@ impl Grid {
         let launch = launch(way, wanted, 0.0);
         let landing = launch_at_end(way, wanted);
         let (ahead, behind) = (graded(&launch, even, 0.5 * length), graded(&landing, even, 0.5 * length));
-        let (from, until) = (ahead.last().copied().unwrap_or(0.0), length - behind.last().copied().unwrap_or(0.0));
+        let (from, until) =
+            (ahead.last().copied().unwrap_or(0.0), length - behind.last().copied().unwrap_or(0.0));
         let between = (((until - from) / even).ceil() as usize).max(1);
         let mut nodes = ahead;
         nodes.extend((1..between).map(|k| from + (until - from) * k as f64 / between as f64));
@@ -77,9 +78,8 @@ fn graded(launch: &Launch, even: f64, most: f64) -> Vec<f64> {
 /// A slow motion: a launch, a steady speed, a landing; with the ends' value and slope exactly.
 fn begin(nodes: &[f64], length: f64, launch: &Launch, landing: &Launch, slow: f64) -> Vec<f64> {
     let cells = nodes.len() - 1;
-    let rise = |launch: &Launch, s: f64| {
-        0.25 * launch.jerk * launch.jerk * (6.0 * s / launch.jerk).powf(4.0 / 3.0)
-    };
+    let rise =
+        |launch: &Launch, s: f64| 0.25 * launch.jerk * launch.jerk * (6.0 * s / launch.jerk).powf(4.0 / 3.0);
     let at = |s: f64| {
         let three = [rise(launch, s), rise(landing, length - s), slow * slow];
         three.iter().map(|b| b.powi(-2)).sum::<f64>().powf(-0.5)

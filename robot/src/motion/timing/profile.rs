@@ -53,14 +53,8 @@ impl Launch {
 impl Profile {
     /// From the control points of `b` over `nodes`, with a launch before and one, reversed, behind.
     pub(super) fn new(nodes: &[f64], control: &[f64], launch: Launch, landing: Launch) -> Self {
-        let first = Cell {
-            time: 0.0,
-            place: 0.0,
-            speed: 0.0,
-            acceleration: 0.0,
-            bend: 0.0,
-            jerk: launch.jerk,
-        };
+        let first =
+            Cell { time: 0.0, place: 0.0, speed: 0.0, acceleration: 0.0, bend: 0.0, jerk: launch.jerk };
         let mut cells = Vec::with_capacity(nodes.len() + 1);
         cells.push(first);
         let mut time = launch.lasts;

@@ -26,9 +26,12 @@ pub(super) type Slopes = [Row; 3];
 impl Way {
     /// None when the postures make no spline.
     pub(super) fn through(step: f64, postures: &[Joints], limits: &MotionLimits) -> Option<Self> {
-        let row = |joints: &Joints| Row::from_iterator(joints.iter().chain(std::iter::repeat(0.0)).take(MAX_JOINTS));
+        let row = |joints: &Joints| {
+            Row::from_iterator(joints.iter().chain(std::iter::repeat(0.0)).take(MAX_JOINTS))
+        };
         let spline = Spline::through(step, postures.iter().map(row).collect())?;
-        let per = [&limits.velocity, &limits.acceleration, &limits.jerk].map(|limit| row(&limit.map(f64::recip)));
+        let per =
+            [&limits.velocity, &limits.acceleration, &limits.jerk].map(|limit| row(&limit.map(f64::recip)));
         Some(Self { joints: limits.joints(), spline, per })
     }
 
