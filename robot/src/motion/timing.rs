@@ -172,7 +172,8 @@ impl PathLimits {
         let way = checked(step, &[still; 4], &limits, &wanted)?;
         let PathSpeed { speed, acceleration, jerk } = wanted;
         let profile = Profile::uniform(length, speed, acceleration, jerk);
-        let brake = PathSpeed { speed, acceleration: BRAKE_UNIFORM * acceleration, jerk: BRAKE_UNIFORM * jerk };
+        let brake =
+            PathSpeed { speed, acceleration: BRAKE_UNIFORM * acceleration, jerk: BRAKE_UNIFORM * jerk };
         Ok(Self { step, speeds: vec![speed; 4], wanted, brake, way, profile })
     }
 
