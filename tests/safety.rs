@@ -18,7 +18,8 @@ fn root() -> PathBuf {
 /// The rows of the table of hazards: four cells each.
 fn hazards() -> Vec<Vec<String>> {
     let text = fs::read_to_string(root().join("docs/safety.md")).unwrap();
-    let table = text.split("| hazard | cause | mitigation | shown by |").nth(1).expect("the table of hazards");
+    let table =
+        text.split("| hazard | cause | mitigation | shown by |").nth(1).expect("the table of hazards");
     let rows = table.lines().skip(2).take_while(|line| line.starts_with('|'));
     rows.map(|line| line.trim_matches('|').split('|').map(|cell| cell.trim().to_owned()).collect()).collect()
 }

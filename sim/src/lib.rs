@@ -35,6 +35,7 @@ mod arm;
 mod cell;
 pub mod controller;
 mod hand;
+pub mod igtl;
 mod knobs;
 mod leg;
 mod machine;

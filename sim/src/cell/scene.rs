@@ -1,6 +1,7 @@
 //! The one world that arm, machine and hand share.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use nalgebra::Vector6;
 use probepath_frames::{Pose, Probe, Stamp, Twist, World, Wrench};
@@ -48,6 +49,14 @@ impl Shared {
     pub(crate) fn lock(&self) -> MutexGuard<'_, Scene> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
+
+    /// Waits until the world has moved on past `before`, or for as long as `patience`; gives its time.
+    pub(crate) fn wait_beyond(&self, before: Stamp, patience: Duration) -> Stamp {
+        let scene = self.lock();
+        let moved = Arc::clone(&scene.moved);
+        let waited = moved.wait_timeout_while(scene, patience, |scene| scene.now() <= before);
+        waited.unwrap_or_else(PoisonError::into_inner).0.now()
+    }
 }
 
 /// The world: what lies there, how the arm stands, and everything that was.
@@ -66,6 +75,8 @@ pub(crate) struct Scene {
     guided: u64,
     connections: u64,
     moments: Vec<Moment>,
+    /// Told at every tick.
+    moved: Arc<Condvar>,
 }
 
 impl Scene {
@@ -95,6 +106,7 @@ impl Scene {
             guided: 0,
             connections: 0,
             moments: Vec::new(),
+            moved: Arc::default(),
             nominal,
         };
         let (joints, world_from_probe) = scene.reached();
@@ -118,6 +130,7 @@ impl Scene {
         let (hand, guiding) = grip.map_or((Wrench::zero(), false), |grip| (grip.wrench, grip.guiding));
         let stamp = last.stamp + TICK;
         self.moments.push(Moment { stamp, joints, world_from_probe, skin, hand, guiding });
+        self.moved.notify_all();
     }
 
     /// Where the motors' positions truly bring the probe.

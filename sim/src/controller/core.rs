@@ -12,6 +12,8 @@ use crate::knobs::Ticks;
 
 /// The clock shows at least this at the start: the official client library waits for 40 s.
 const CLOCK_AT_LEAST: Span = Span::from_milliseconds(60_000);
+/// Ticks that a person waits for what holds the arm, in simulated time.
+const LONGEST_WAIT: u32 = 30_000;
 /// Words that are kept of a popup.
 const LONGEST_POPUP: usize = 500;
 
@@ -289,15 +291,25 @@ impl Controller {
         self.program.as_ref().map(Program::pulse)
     }
 
+    /// Whether something has still to come to its end with nobody there: a motion, a watchdog that was set.
+    pub(super) fn is_unsettled(&self) -> bool {
+        self.is_moving() || self.program.as_ref().is_some_and(|program| program.watchdog().is_some())
+    }
+
     /// In simulated time the person who comes to the pendant does so when whatever held the arm is over.
     pub(super) fn wait_out(&mut self) {
         let held = |c: &Self| {
             c.knob(c.config.knobs.emergency_stop) || c.knob(c.config.knobs.safeguard_stop) || c.is_moving()
         };
-        while self.config.time == super::Time::Simulated && !self.robot.safety.moves() && held(self) {
-            self.tick();
+        if self.config.time == super::Time::Wall || self.robot.safety.moves() {
+            return;
         }
-        self.turn_knobs();
+        for _ in 0..LONGEST_WAIT {
+            self.tick();
+            if self.robot.safety.moves() || !held(self) {
+                return;
+            }
+        }
     }
 
     /// A popup on the pendant. The person there reads it.
@@ -313,7 +325,6 @@ impl Controller {
         if self.robot.safety != Safety::ProtectiveStop {
             return true;
         }
-        self.wait_out();
         let until = self.stopped_at + Span::from_seconds(self.config.unlock_after_s);
         while self.config.time == super::Time::Simulated && self.now() < until {
             self.tick();

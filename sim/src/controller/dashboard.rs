@@ -10,6 +10,7 @@ const SERIAL: &str = "20265500001";
 
 /// The answer to a line, without its end; `None` says goodbye.
 pub(super) fn answer(controller: &mut Controller, line: &str) -> Option<String> {
+    controller.wait_out();
     let line = line.trim();
     let (word, rest) = line.split_once(' ').unwrap_or((line, ""));
     Some(match (word, rest.trim()) {
@@ -68,9 +69,6 @@ fn says(c: &Controller, line: &str) -> Option<String> {
 
 /// Power, brakes, stops.
 fn power(c: &mut Controller, line: &str) -> Option<String> {
-    if matches!(line, "power on" | "brake release") {
-        c.wait_out();
-    }
     Some(match line {
         "power on" => {
             if c.robot.safety == Safety::EmergencyStop {
@@ -119,9 +117,6 @@ fn power(c: &mut Controller, line: &str) -> Option<String> {
 
 /// Programs. None on the pendant can be run: there is no interpreter.
 fn program(c: &mut Controller, line: &str) -> Option<String> {
-    if line == "play" {
-        c.wait_out();
-    }
     Some(match line {
         "play" if c.play() => "Starting program".into(),
         "play" => "Failed to execute: play".into(),

@@ -81,6 +81,7 @@ impl Register {
     pub(super) fn of(name: &str) -> Option<Self> {
         let index = |text: &str, range: std::ops::Range<usize>| {
             let honest = !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit()) && text.len() < 4;
+            let honest = honest && (text == "0" || !text.starts_with('0'));
             text.parse().ok().filter(|i| honest && range.contains(i))
         };
         if name == "bit_registers0_to_31" {

@@ -82,7 +82,7 @@ pub(super) enum Wish {
 #[derive(Debug)]
 pub(super) struct Robot {
     pub(super) arm: Kinematics,
-    pub(super) payload: Payload,
+    payload: Payload,
     pub(super) safety: Safety,
     pub(super) power: Power,
     /// The pendant's speed slider, 0 to 1.
@@ -304,6 +304,18 @@ impl Robot {
 
     pub(super) const fn is_free(&self) -> bool {
         matches!(self.overlay, Some(Overlay::Freedrive(_)))
+    }
+
+    /// What it carries from now on; readings under another payload are forgotten.
+    pub(super) fn carry(&mut self, payload: Payload) {
+        if payload != self.payload {
+            self.payload = payload;
+            self.reading.forget();
+        }
+    }
+
+    pub(super) const fn payload(&self) -> &Payload {
+        &self.payload
     }
 
     /// `zero_ftsensor`.

@@ -21,6 +21,8 @@ const PAUSE: u8 = b'P';
 
 /// Ticks of the controller in a second.
 const FASTEST_HZ: f64 = 500.0;
+/// Version 1 has no rate of the client's.
+const V1_HZ: f64 = 125.0;
 /// Input recipes of one connection; ids are a byte and 0 is the bad one.
 const MOST_RECIPES: usize = 255;
 
@@ -163,7 +165,7 @@ impl Session {
     /// Names, comma-separated; a trailing comma names nothing. In version 2 the rate comes before.
     fn set_up_outputs(&mut self, payload: &[u8]) -> Vec<u8> {
         let (rate, names) = match (self.version, payload.split_first_chunk::<8>()) {
-            (1, _) => (FASTEST_HZ, payload),
+            (1, _) => (V1_HZ, payload),
             (_, Some((rate, names))) => (f64::from_be_bytes(*rate), names),
             _ => (FASTEST_HZ, &[][..]),
         };

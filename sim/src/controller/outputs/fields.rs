@@ -50,14 +50,14 @@ pub(in crate::controller) const FIELDS: &[Field] = &[
     ("tcp_force_scalar", "DOUBLE", |c| Value::F64(c.robot.reading().felt().fixed_rows::<3>(0).norm())),
     ("ft_raw_wrench", "VECTOR6D", |c| Value::V6(c.robot.reading().raw())),
     ("wrench_calc_from_currents", "VECTOR6D", |c| vector(&pose::turned_axes(&c.robot.reading().felt()))),
-    ("target_base_acceleration", "VECTOR3D", |_| Value::V3([0.0; 3])),
+    ("target_base_acceleration", "VECTOR6D", |_| Value::V6([0.0; 6])),
     ("target_base_wrench", "VECTOR6D", |_| Value::V6([0.0; 6])),
     ("actual_tool_accelerometer", "VECTOR3D", |c| Value::V3(c.robot.accelerometer())),
     ("elbow_position", "VECTOR3D", |c| Value::V3(c.robot.elbow())),
     ("elbow_velocity", "VECTOR3D", |_| Value::V3([0.0; 3])),
     // The payload.
-    ("payload", "DOUBLE", |c| Value::F64(c.robot.payload.mass_kg)),
-    ("payload_cog", "VECTOR3D", |c| Value::V3(c.robot.payload.centre_m.into())),
+    ("payload", "DOUBLE", |c| Value::F64(c.robot.payload().mass_kg)),
+    ("payload_cog", "VECTOR3D", |c| Value::V3(c.robot.payload().centre_m.into())),
     ("payload_inertia", "VECTOR6D", |_| Value::V6([0.0; 6])),
     ("target_gravity", "VECTOR3D", |_| Value::V3([0.0, 0.0, 9.82])),
     // Modes.

@@ -86,7 +86,7 @@ impl Own {
     /// Before the threads run: the tool, the first words.
     pub(in crate::controller) fn begin(&mut self, cycle: &mut Cycle<'_>) {
         let Parameters { mass_kg, centre_of_gravity_m: centre_m, .. } = self.given;
-        cycle.robot.payload = Payload { mass_kg, centre_m };
+        cycle.robot.carry(Payload { mass_kg, centre_m });
         cycle.robot.arm.tcp = nalgebra::Isometry3::identity();
         self.q = numbers(cycle.robot.target().0);
         self.seq = input(cycle, registers::IN_SEQUENCE);

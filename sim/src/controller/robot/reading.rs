@@ -80,6 +80,11 @@ impl ForceReading {
         self.felt = self.at_tool(&(left - self.zero));
     }
 
+    /// What was read before counts no more.
+    pub(super) fn forget(&mut self) {
+        self.recent.clear();
+    }
+
     /// What it reads now is nothing from now on.
     pub(super) fn zero(&mut self) {
         let n = self.recent.len().max(1) as f64;

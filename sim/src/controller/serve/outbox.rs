@@ -70,3 +70,29 @@ impl Outbox {
         self.letters.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn letter(number: u8, fleeting: bool) -> Letter {
+        Letter { bytes: vec![number], due: None, fleeting, last: false }
+    }
+
+    #[test]
+    fn an_overloaded_client_gets_every_answer_and_only_the_newest_data() {
+        let outbox = Outbox::default();
+        let displaced: u64 = (0..100).map(|number| outbox.put(letter(number, number % 10 != 0))).sum();
+        outbox.put(Letter { last: true, ..letter(100, false) });
+        let mut read = Vec::new();
+        while read.last() != Some(&100) {
+            read.extend(outbox.take().map(|letter| letter.bytes[0]).into_iter());
+        }
+        assert!(read.windows(2).all(|pair| pair[0] < pair[1]), "in order");
+        assert_eq!(read.iter().filter(|number| **number % 10 == 0).count(), 11, "answers are never skipped");
+        assert_eq!(displaced, 101 - read.len() as u64);
+        assert!(displaced > 70 && read.contains(&99), "{read:?}");
+        outbox.close();
+        assert!(outbox.take().is_none());
+    }
+}

@@ -56,8 +56,8 @@ fn simulated(server: &Server) {
                 let waited = server.came.wait_timeout(world, AGAIN);
                 drop(waited.unwrap_or_else(PoisonError::into_inner));
             }
-            // A program whose client is gone, or nobody's motion: its time goes on by itself.
-            None if world.controller.pulse().is_some() || world.controller.is_moving() => {
+            // The client is gone: time goes on by itself until the arm rests and no watchdog is waited for.
+            None if world.controller.is_unsettled() => {
                 seen = None;
                 world.tick();
                 world.send(false);

@@ -158,8 +158,8 @@ impl UrRtde {
             17 | 65 => {
                 let [_, x, y, z, ..] = self.six(cycle, 0);
                 let given = Vector3::new(x, y, z);
-                let centre_m = if given.norm() > 0.0 { given } else { cycle.robot.payload.centre_m };
-                cycle.robot.payload = Payload { mass_kg: first, centre_m };
+                let centre_m = if given.norm() > 0.0 { given } else { cycle.robot.payload().centre_m };
+                cycle.robot.carry(Payload { mass_kg: first, centre_m });
             }
             20 => cycle.robot.force_damping = within(first, 0.0, 1.0, 0.025),
             21 => cycle.robot.force_gain = within(first, 0.01, 2.0, 0.5),
