@@ -37,6 +37,8 @@ pub enum Command {
     Convert(Convert),
     /// What the model of an arm says; forward and inverse kinematics.
     Arm(Arm),
+    /// Serves the simulated cell on the protocols of a real one, until Ctrl-C.
+    Simulate(Simulate),
     /// Prints a table: ours beside the published figure.
     Validate(Validate),
 }
@@ -118,6 +120,32 @@ pub struct Arm {
     /// Where the flange should be: x, y, z (mm) and rotation vector (degrees), separated by commas: which joints?
     #[arg(long, value_name = "X,Y,Z,RX,RY,RZ", value_delimiter = ',', allow_hyphen_values = true)]
     pub flange_mm_deg: Option<Vec<f64>>,
+}
+
+/// `simulate`
+#[derive(Args, Debug)]
+pub struct Simulate {
+    /// The cell: leg or phantom, arm, what fails. The simulated leg when none is given.
+    #[arg(long, value_name = "CELL.toml")]
+    pub cell: Option<PathBuf>,
+    /// Seed of the simulated cell.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// The address to listen on; the ports are the controller's. Several cells side by side take 127.0.0.2 and so on.
+    #[arg(long, default_value = "127.0.0.1")]
+    pub host: std::net::IpAddr,
+    /// What makes the clock go.
+    #[arg(long, value_enum, default_value_t = Clock::Wall)]
+    pub time: Clock,
+}
+
+/// What makes a simulated cell's clock go.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Clock {
+    /// 500 Hz.
+    Wall,
+    /// A tick for each package of the client whose script runs.
+    Simulated,
 }
 
 /// `validate`

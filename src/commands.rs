@@ -1,6 +1,7 @@
 //! Each command: what was typed, brought to the room that does it.
 
 mod calibrate;
+mod simulate;
 
 use std::error::Error;
 
@@ -35,6 +36,7 @@ pub fn perform(command: Command, screen: &Screen) -> Outcome {
             joints_deg: args.joints_deg,
             flange_mm_deg: args.flange_mm_deg,
         })?),
+        Command::Simulate(args) => return simulate::perform(args, screen),
         Command::Validate(args) => return validated(&args, screen),
     };
     Ok(document?)

@@ -14,7 +14,7 @@ use serde::Serialize;
 pub struct Document {
     /// For people.
     pub text: String,
-    /// For programs.
+    /// For programs; null when they were told already, and the text goes to people only.
     pub json: serde_json::Value,
 }
 
@@ -48,9 +48,24 @@ impl Screen {
         Arc::new(Bar(self.bar.clone()))
     }
 
-    /// Leaves the document. A reader that went away (a closed pipe) is not a failure.
+    /// Leaves the document of something that goes on.
+    pub fn ready(&self, document: &Document) -> std::io::Result<()> {
+        let mut out = std::io::stdout().lock();
+        if self.json {
+            writeln!(out, "{:#}", document.json)?;
+        } else {
+            writeln!(out, "{}", document.text.trim_end())?;
+        }
+        out.flush()
+    }
+
+    /// Leaves the document; nothing when all was said already. A reader that went away (a closed pipe) is not a failure.
     pub fn document(&self, document: &Document) -> ExitCode {
         self.bar.finish_and_clear();
+        if document.json.is_null() {
+            let _ = writeln!(std::io::stderr().lock(), "{}", document.text.trim_end());
+            return ExitCode::SUCCESS;
+        }
         let mut out = std::io::stdout().lock();
         let written = if self.json {
             writeln!(out, "{:#}", document.json)

@@ -1,4 +1,5 @@
-//! Work without an arm: reconstruct an exam or a sequence once more, compare surfaces, convert files, ask a model.
+//! Work without an arm: reconstruct an exam or a sequence once more, compare surfaces, convert files, ask a model, serve
+//! a simulated cell.
 //!
 //! Each answer says itself twice: as text for people (`Display`) and as data for programs (`Serialize`).
 
@@ -7,8 +8,10 @@ pub mod calibrate;
 mod compare;
 mod convert;
 mod reconstruct;
+mod simulate;
 
 pub use arm::{ArmAnswer, ArmError, ArmQuestion, arm};
 pub use compare::{CompareError, Comparison, compare};
 pub use convert::{ConvertError, Converted, convert};
 pub use reconstruct::{ReconstructError, Reconstructed, reconstruct};
+pub use simulate::{Served, ServedArm, SimulateError, SimulateRequest, Simulating, simulate};

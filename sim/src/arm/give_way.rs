@@ -94,3 +94,53 @@ pub(crate) fn difference(here: &Isometry3<f64>, goal: &Isometry3<f64>) -> Vector
     let turn: Vector3<f64> = (goal.rotation * here.rotation.inverse()).scaled_axis();
     Vector6::new(place.x, place.y, place.z, turn.x, turn.y, turn.z)
 }
+
+#[cfg(test)]
+mod tests {
+    use probepath_robot::{Arm, Command};
+
+    use super::*;
+    use crate::cell::{CellConfig, SimulatedCell};
+
+    #[test]
+    fn in_freedrive_the_hand_leads_the_arm_along_the_leg_and_then_it_rests() {
+        for seed in 1..=2 {
+            let cell = SimulatedCell::new(&CellConfig::default(), seed).unwrap();
+            let mut arm = cell.arm();
+            cell.hand().guide();
+            let mut state = arm.exchange(&Command::Freedrive).unwrap();
+            let mut ticks = 0;
+            while cell.hand().guides() && ticks < 90 * 500 {
+                state = arm.exchange(&Command::Freedrive).unwrap();
+                assert!((state.commanded.zip(&state.position, |a, b| a - b)).largest() < 0.02);
+                ticks += 1;
+            }
+            assert!(!state.guiding && ticks > 2000, "{ticks}");
+            let moments = cell.truth().moments();
+            let forces: Vec<f64> = moments.iter().map(|m| m.skin.force.norm()).filter(|f| *f > 0.5).collect();
+            let mean = forces.iter().sum::<f64>() / forces.len() as f64;
+            let most = forces.iter().copied().fold(0.0, f64::max);
+            assert!((3.0..6.0).contains(&mean) && most < 16.0, "{mean} {most}");
+            let z = |i: usize| moments[i].world_from_probe.origin().vector().z;
+            let furthest = (0..moments.len()).map(z).fold(0.0, f64::min);
+            assert!(furthest < -0.19, "{furthest}");
+            // Let go of, it drifts to rest, and the next command goes on from there.
+            (0..200).for_each(|_| state = arm.exchange(&Command::Freedrive).unwrap());
+            state = arm.exchange(&Command::Position(state.commanded)).unwrap();
+            assert!(state.velocity.largest() < 0.05);
+        }
+    }
+
+    #[test]
+    fn newton_brings_the_tool_where_it_was_asked_and_says_when_it_cannot() {
+        let cell = SimulatedCell::new(&CellConfig::default(), 1).unwrap();
+        let (model, tool) = (cell.nominal().model(), cell.nominal().flange_from_probe);
+        let start = cell.nominal().start;
+        let velocity = Vector6::new(0.1, -0.05, 0.02, 0.3, 0.1, -0.2);
+        let next = moved(model, &tool, &start, &velocity, 0.002).unwrap();
+        let (here, there) = (model.forward(&start) * tool, model.forward(&next) * tool);
+        let went = difference(here.isometry(), there.isometry());
+        assert!((went - velocity * 0.002).norm() < 1e-9);
+        assert!(moved(model, &tool, &start, &(velocity * 1e4), 0.002).is_none());
+    }
+}

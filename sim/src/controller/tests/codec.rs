@@ -91,6 +91,8 @@ fn input_recipes_are_numbered_in_order_and_may_share_registers() {
     let package = [&[23], &7_i32.to_be_bytes()[..], &1.5_f64.to_be_bytes()[..]].concat();
     assert!(rig.say(&mut session, b'U', &package).is_empty());
     assert_eq!((rig.controller.input.int(0), rig.controller.input.double(0)), (7, 1.5));
+    let longer = [&package[..], &[1; 40]].concat();
+    assert!(rig.say(&mut session, b'U', &longer).is_empty(), "what is beyond the recipe is left");
     let reply = rig.say(&mut session, b'U', &package[..9]);
     assert_eq!(reply[2], b'M', "a package that is too short is said, and nothing taken of it");
 }

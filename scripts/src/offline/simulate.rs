@@ -1,0 +1,147 @@
+//! `probepath simulate`: the simulated cell, served on its real protocols.
+
+use std::fmt;
+use std::net::IpAddr;
+use std::path::PathBuf;
+
+use probepath_sim::controller::{ControllerConfig, ControllerError, ControllerServer, Ports, Running, Time};
+use probepath_sim::{CellError, SimulatedCell};
+use serde::Serialize;
+use thiserror::Error;
+
+use crate::session::{CellFile, SessionError};
+
+/// What is to be served, and where.
+#[derive(Clone, Debug)]
+pub struct SimulateRequest {
+    /// The cell's file; the simulated leg when absent.
+    pub cell: Option<PathBuf>,
+    /// The cell's seed.
+    pub seed: u64,
+    /// The address to listen on.
+    pub host: IpAddr,
+    /// Whether the clock is the client's packages instead of the wall's.
+    pub simulated_time: bool,
+}
+
+/// A cell that is being served, until this is dropped.
+#[derive(Debug, Serialize)]
+pub struct Simulating {
+    /// The cell's name.
+    pub cell: String,
+    /// Its seed.
+    pub seed: u64,
+    /// The address.
+    pub host: IpAddr,
+    /// `wall` or `simulated`.
+    pub time: Time,
+    /// What is served at which port.
+    pub ports: Vec<Served>,
+    /// What a client has to know of the arm.
+    pub arm: ServedArm,
+    #[serde(skip)]
+    running: Running,
+}
+
+/// One port.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Served {
+    /// Its number.
+    pub port: u16,
+    /// What answers there.
+    pub what: &'static str,
+}
+
+/// What a client has to know of the arm to measure forces with it.
+#[derive(Clone, Debug, Serialize)]
+pub struct ServedArm {
+    /// What it carries (kg).
+    pub payload_kg: f64,
+    /// Where that has its centre of gravity on the flange (mm).
+    pub centre_of_gravity_mm: [f64; 3],
+    /// Where the probe's face is on the flange: place (mm).
+    pub probe_on_flange_mm: [f64; 3],
+    /// And turn about the flange's axes (rotation vector, degrees).
+    pub probe_on_flange_deg: [f64; 3],
+}
+
+/// Why nothing is served.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum SimulateError {
+    /// The cell's file.
+    #[error(transparent)]
+    File(#[from] SessionError),
+    /// The cell.
+    #[error("the simulated cell cannot be built: {0}")]
+    Cell(#[from] CellError),
+    /// The controller.
+    #[error(transparent)]
+    Controller(#[from] ControllerError),
+}
+
+/// Serves a cell.
+///
+/// # Errors
+/// When its file cannot be read, it cannot be built, or a port is taken.
+pub fn simulate(request: &SimulateRequest) -> Result<Simulating, SimulateError> {
+    let file = request.cell.as_deref().map_or_else(|| Ok(CellFile::default()), CellFile::read)?;
+    let cell = SimulatedCell::new(&file.simulated, request.seed)?;
+    let time = if request.simulated_time { Time::Simulated } else { Time::Wall };
+    let arm = described(&cell);
+    let config = ControllerConfig { host: request.host, time, ..ControllerConfig::default() };
+    let running = ControllerServer::start(cell, config)?;
+    let ports = PORTS.map(|(port, what)| Served { port, what }).to_vec();
+    Ok(Simulating { cell: file.name, seed: request.seed, host: request.host, time, ports, arm, running })
+}
+
+const PORTS: [(u16, &str); 5] = [
+    (Ports::RTDE, "RTDE: real-time data, 500 Hz"),
+    (Ports::DASHBOARD, "dashboard: power, brakes, protective stops, popups"),
+    (Ports::PRIMARY, "primary: version, scripts"),
+    (Ports::SECONDARY, "secondary: version, scripts"),
+    (Ports::REALTIME, "scripts"),
+];
+
+fn described(cell: &SimulatedCell) -> ServedArm {
+    let tool = cell.config().arm.tool;
+    let probe = cell.nominal().flange_from_probe;
+    let turn = probe.isometry().rotation.scaled_axis();
+    ServedArm {
+        payload_kg: tool.mass_kg,
+        centre_of_gravity_mm: tool.centre_of_gravity_mm,
+        probe_on_flange_mm: (probe.origin().vector() * 1e3).into(),
+        probe_on_flange_deg: [turn.x.to_degrees(), turn.y.to_degrees(), turn.z.to_degrees()],
+    }
+}
+
+impl Simulating {
+    /// What happened while it was served, in words.
+    pub fn farewell(&self) -> String {
+        let all = self.running.counters();
+        format!(
+            "served {} ticks, {} packages and {} scripts to {} RTDE clients; {} packages were skipped, the clock fell \
+             behind the machine's {} times",
+            all.ticks, all.packages, all.scripts, all.rtde_clients, all.skipped, all.slips
+        )
+    }
+}
+
+impl fmt::Display for Simulating {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let time = match self.time {
+            Time::Wall => "500 Hz by the wall's clock",
+            Time::Simulated => "a tick for each package of its client",
+        };
+        writeln!(f, "{} (seed {}), a simulated UR5e: {time}", self.cell, self.seed)?;
+        for Served { port, what } in &self.ports {
+            writeln!(f, "  {}:{port}  {what}", self.host)?;
+        }
+        let ServedArm { payload_kg, centre_of_gravity_mm: [x, y, z], .. } = self.arm;
+        writeln!(
+            f,
+            "It carries {payload_kg} kg, centre of gravity {x}, {y}, {z} mm from the flange: tell it so."
+        )?;
+        write!(f, "No hardware moves. Ctrl-C ends it.")
+    }
+}
