@@ -75,6 +75,8 @@ pub(crate) struct Scene {
     guided: u64,
     connections: u64,
     moments: Vec<Moment>,
+    /// How many moments were forgotten before the first that is kept.
+    forgotten: u64,
     /// Told at every tick.
     moved: Arc<Condvar>,
 }
@@ -106,6 +108,7 @@ impl Scene {
             guided: 0,
             connections: 0,
             moments: Vec::new(),
+            forgotten: 0,
             moved: Arc::default(),
             nominal,
         };
@@ -173,10 +176,19 @@ impl Scene {
 
     #[allow(
         clippy::indexing_slicing,
-        reason = "the first moment is there from the beginning and none is removed"
+        reason = "there is a first moment from the beginning, and the last is never removed"
     )]
     pub(crate) fn last(&self) -> &Moment {
         &self.moments[self.moments.len() - 1]
+    }
+
+    /// Keeps the last `most` moments, and at most as many again until it forgets them.
+    pub(crate) fn forget_before(&mut self, most: usize) {
+        if self.moments.len() > most.max(1).saturating_mul(2) {
+            let old = self.moments.len() - most.max(1);
+            self.moments.drain(..old);
+            self.forgotten += old as u64;
+        }
     }
 
     pub(crate) fn moments(&self) -> &[Moment] {
@@ -185,7 +197,7 @@ impl Scene {
 
     /// Ticks since the world's beginning.
     pub(crate) const fn tick(&self) -> u64 {
-        self.moments.len() as u64 - 1
+        self.forgotten + self.moments.len() as u64 - 1
     }
 
     pub(crate) fn now(&self) -> Stamp {

@@ -24,6 +24,8 @@ pub struct ControllerConfig {
     pub powered: bool,
     /// How long after a protective stop it may be unlocked (s); the real one wants 5.
     pub unlock_after_s: f64,
+    /// For how long the cell's truth is remembered (s); all of it when absent, which is 0.2 MB a second.
+    pub remembers_s: Option<f64>,
 }
 
 impl Default for ControllerConfig {
@@ -36,6 +38,7 @@ impl Default for ControllerConfig {
             hand: Helper::default(),
             powered: true,
             unlock_after_s: 5.0,
+            remembers_s: None,
         }
     }
 }
@@ -125,6 +128,7 @@ impl ControllerConfig {
     pub(super) fn check(&self) -> Result<(), ControllerError> {
         let all = [
             ("unlock_after_s", self.unlock_after_s, 3600.0),
+            ("remembers_s", self.remembers_s.unwrap_or(0.0), 1e6),
             ("knobs.latency_ms", self.knobs.latency_ms, 60_000.0),
             ("knobs.jitter_ms", self.knobs.jitter_ms, 60_000.0),
         ];

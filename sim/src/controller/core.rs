@@ -118,6 +118,9 @@ impl Controller {
         self.robot.tick();
         self.look_after(before);
         self.lend_a_hand();
+        if let Some(seconds) = self.config.remembers_s {
+            self.cell.shared().lock().forget_before((seconds * TICKS_PER_S) as usize);
+        }
     }
 
     fn knob(&self, ticks: Option<Ticks>) -> bool {
@@ -349,6 +352,5 @@ impl Controller {
 
 /// Whether a popup asks the person at the pendant to guide the probe.
 fn asks_to_guide(text: &str) -> bool {
-    let text = text.to_lowercase();
-    text.contains("guide") && !text.contains("let go")
+    text.to_lowercase().contains("guide")
 }

@@ -113,8 +113,24 @@ fn a_popup_that_asks_to_guide_finds_a_hand() {
     let mut rig = Rig::new();
     answer(&mut rig, "popup Please wait");
     assert!(!rig.controller.teach_button());
-    answer(&mut rig, "popup Take the probe and guide it along the artery");
+    answer(&mut rig, "popup Hold the switch, guide the probe along the artery, lift it off, let go.");
     assert!(rig.controller.teach_button() && rig.controller.popup.is_some());
     answer(&mut rig, "close popup");
     assert!(rig.controller.popup.is_none());
+}
+
+#[test]
+fn what_is_too_old_is_forgotten_and_the_ticks_go_on() {
+    let mut rig = Rig::new();
+    rig.controller.config.remembers_s = Some(0.2);
+    let before = rig.controller.now();
+    rig.ticks(1000);
+    let moments = rig.controller.cell.truth().moments();
+    assert!((100..=201).contains(&moments.len()), "{}", moments.len());
+    assert!(((rig.controller.now() - before).seconds() - 2.0).abs() < 1e-9);
+    let scene = rig.controller.cell.shared();
+    assert_eq!(scene.lock().tick(), 1000);
+    let last = moments[moments.len() - 1];
+    assert_eq!(scene.lock().world_from_probe(last.stamp), Some(last.world_from_probe));
+    assert_eq!(scene.lock().world_from_probe(before), None, "it is forgotten, not guessed");
 }
