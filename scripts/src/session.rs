@@ -22,7 +22,7 @@ mod visit;
 use std::path::{Path as FilePath, PathBuf};
 use std::sync::Arc;
 
-use probepath_frames::Stamp;
+use probepath_frames::{Base, Pose, Stamp, World};
 use probepath_robot::drivers::Address;
 use probepath_robot::{Guard, MotionLimits, Operator, State, Trip};
 use probepath_sim::{SimulatedCell, Truth};
@@ -132,6 +132,16 @@ impl Session {
     /// The report, once one was made.
     pub const fn last_report(&self) -> Option<&Report> {
         self.report.as_ref()
+    }
+
+    /// Where the room is from the arm's base.
+    pub(crate) fn base_from_world(&self) -> Pose<Base, World> {
+        self.cell.facts.world_from_base.inverse()
+    }
+
+    /// The stamp of the last tick.
+    pub(crate) const fn now(&self) -> Stamp {
+        self.now
     }
 
     /// The limits of every command.

@@ -102,6 +102,17 @@ pub enum PathError {
         /// The most allowed (mm).
         most_mm: f64,
     },
+    /// No path of least jerk was found.
+    #[error(
+        "no path was found that stays within {tube_mm} mm and {tube_deg:.2} degrees of what was taught: \
+         allow more, or teach again"
+    )]
+    Tube {
+        /// How far from what was taught (mm).
+        tube_mm: f64,
+        /// How far turned (degrees).
+        tube_deg: f64,
+    },
     /// A setting that makes no sense.
     #[error("{name} = {value} cannot be: {why}")]
     Setting {

@@ -46,7 +46,7 @@ pub use freedrive::Freedrive;
 pub use hand_guide::{GiveWay, GuideError, HandGuide};
 pub use lift_off::LiftOff;
 pub use path::{
-    Bridge, Cleaning, CleaningReport, ContactSign, Label, Listed, Path, PathPoint, Side, TaughtForce,
+    Bridge, Cleaning, CleaningReport, ContactSign, Label, Listed, Path, PathPoint, Side, TaughtForce, Tube,
 };
 pub use plan::{Place, Plan, PlanError, PlanReport, PlanSettings, Refusal};
 pub use probe_arm::ProbeArm;

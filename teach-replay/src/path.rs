@@ -10,13 +10,14 @@ mod resample;
 mod smooth;
 #[cfg(test)]
 mod taught;
+mod tube;
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use probepath_frames::{Base, Direction, Point, Pose, Probe};
 use probepath_robot::motion::follow::PoseCurve;
 use serde::{Deserialize, Serialize};
 
-pub use clean::{Bridge, Cleaning, CleaningReport};
+pub use clean::{Bridge, Cleaning, CleaningReport, Tube};
 pub use contact::ContactSign;
 pub use file::Listed;
 

@@ -15,7 +15,7 @@ pub(super) type Outcome<T> = Result<T, Box<EvalAltResult>>;
 
 /// How each step is written, for messages.
 const USAGE: &[(&str, &str)] = &[
-    ("teach", "teach(#{ study: \"LEG-007\", side: \"left\" }), or with by: \"freedrive\""),
+    ("teach", "teach(#{ study: \"LEG-007\", side: \"left\" }), or with by: \"freedrive\", stay_within: mm(1)"),
     ("load_path", "load_path(\"femoral.path.toml\")"),
     ("save", "path.save(\"femoral.path.toml\")"),
     ("trim", "path.trim(mm(10), mm(210))"),
@@ -192,6 +192,9 @@ fn teach_wish(map: Map) -> Result<TeachWish, String> {
                 ));
             }
         };
+    }
+    if let Some(within) = options.quantity::<Length>("stay_within")? {
+        wish.stay_within_m = Some(within.si());
     }
     options.done()?;
     Ok(wish)

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use probepath_frames::{Direction, Point, World};
 use probepath_robot::{Controller, GuardLimits};
 use probepath_teach_replay::{
-    Cleaning, Freedrive, GiveWay, HandGuide, Label, Path, ProbeArm, Recording, Side,
+    Cleaning, Freedrive, GiveWay, HandGuide, Label, Path, ProbeArm, Recording, Side, Tube,
 };
 use probepath_us_capture::exam::Attachment;
 
@@ -21,6 +21,9 @@ pub struct TeachWish {
     pub side: Side,
     /// How the arm gives way to the hand.
     pub by: GuideBy,
+    /// How far the path may be from what the hand did (m): then it is the one of least jerk that stays so near. None
+    /// takes the tremor out and says how far that moved it.
+    pub stay_within_m: Option<f64>,
 }
 
 /// How the arm gives way to the hand.
@@ -35,7 +38,7 @@ pub enum GuideBy {
 
 impl Default for TeachWish {
     fn default() -> Self {
-        Self { study: "STUDY".into(), side: Side::Left, by: GuideBy::default() }
+        Self { study: "STUDY".into(), side: Side::Left, by: GuideBy::default(), stay_within_m: None }
     }
 }
 
@@ -72,7 +75,9 @@ impl Session {
             side: wish.side,
             date: self.opening.date.clone().unwrap_or_else(|| "simulated".into()),
         };
-        let (path, report) = Path::clean(recording.samples(), label, &Cleaning::default())?;
+        let tube = wish.stay_within_m.map(Tube::of);
+        let cleaning = Cleaning { tube, ..Cleaning::default() };
+        let (path, report) = Path::clean(recording.samples(), label, &cleaning)?;
         self.smoothed_m = Some(report.moved_most);
         self.say(&format!(
             "Taught {:.0} mm: {} of {} states used, {:.1} s of pauses left out, smoothing moved the path by at most \

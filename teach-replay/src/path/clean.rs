@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use nalgebra::Vector3;
+use nalgebra::{SVector, Vector3};
 use probepath_robot::motion::spline::Spline;
 
 use super::beside::Beside;
@@ -11,6 +11,7 @@ use super::contact::{ContactSign, stretches};
 use super::progress::Progress;
 use super::resample::uniform;
 use super::smooth::smooth;
+use super::tube::within;
 use super::{Label, Path, PathPoint, TaughtForce};
 use crate::{PathError, Sample};
 
@@ -41,6 +42,31 @@ pub struct Cleaning {
     pub most_moved: f64,
     /// The shortest path (m).
     pub least_length: f64,
+    /// When it is given, the path is the one of least jerk that stays inside it; `smooth_over` then fills in only what
+    /// was bridged.
+    pub tube: Option<Tube>,
+}
+
+/// How far the path may be from what was taught.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tube {
+    /// The probe's origin (m).
+    pub metres: f64,
+    /// The probe's orientation (rad).
+    pub radians: f64,
+}
+
+impl Tube {
+    /// `metres` and one degree.
+    pub fn of(metres: f64) -> Self {
+        Self { metres, radians: 1f64.to_radians() }
+    }
+
+    /// Half widths of origin and rotation vector: the cube inside the ball.
+    fn widths(&self) -> SVector<f64, 6> {
+        let (m, r) = (self.metres / 3f64.sqrt(), self.radians / 3f64.sqrt());
+        SVector::from([m, m, m, r, r, r])
+    }
 }
 
 impl Default for Cleaning {
@@ -52,6 +78,7 @@ impl Default for Cleaning {
             bridge: 0.03,
             most_moved: 0.005,
             least_length: 0.01,
+            tube: None,
         }
     }
 }
@@ -70,6 +97,10 @@ impl Cleaning {
         least("bridge", self.bridge, 0.0, "not negative")?;
         least("most_moved", self.most_moved, 0.0, "not negative")?;
         least("least_length", self.least_length, 4.0 * self.spacing, "at least four spacings")?;
+        if let Some(Tube { metres, radians }) = self.tube {
+            least("tube.metres", metres, 1e-5, "at least 0.00001 m")?;
+            least("tube.radians", radians, 1e-5, "at least 0.00001 rad")?;
+        }
         let ContactSign::Force { on_n, off_n } = self.contact else { return Ok(()) };
         least("on_n", on_n, 1e-3, "above zero")?;
         least("off_n", off_n, 1e-3, "above zero")?;
@@ -227,8 +258,13 @@ impl<'a> Contact<'a> {
         let step = cleaning.spacing;
         let bins = Bins::of(self, step)?;
         let bridges = bins.bridges(cleaning)?;
-        let smoothed =
-            smooth(&bins.values, cleaning.smooth_over / step).ok_or_else(|| bins.too_short(cleaning))?;
+        let cutoff = cleaning.smooth_over / step;
+        let smooth = smooth(&bins.values, cutoff).ok_or_else(|| bins.too_short(cleaning))?;
+        let smoothed = match cleaning.tube {
+            None => smooth,
+            Some(tube) => within(&bins.values, &tube.widths(), cutoff)
+                .ok_or(PathError::Tube { tube_mm: tube.metres * 1e3, tube_deg: tube.radians.to_degrees() })?,
+        };
         let curve = Spline::through(step, smoothed).ok_or_else(|| bins.too_short(cleaning))?;
         let moved = bins.moved(&curve, cleaning)?;
         let points: Vec<PathPoint> =

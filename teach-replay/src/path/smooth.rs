@@ -25,7 +25,7 @@ pub(super) fn smooth<const D: usize>(values: &[Weighted<D>], cutoff: f64) -> Opt
 }
 
 /// `lambda D^T D` for third differences `D`, as diagonal and three superdiagonals of each row.
-fn penalty(n: usize, lambda: f64) -> Vec<[f64; 4]> {
+pub(super) fn penalty(n: usize, lambda: f64) -> Vec<[f64; 4]> {
     const DIFFERENCE: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
     let mut bands = vec![[0.0; 4]; n];
     for first in 0..n - 3 {
@@ -39,7 +39,7 @@ fn penalty(n: usize, lambda: f64) -> Vec<[f64; 4]> {
 }
 
 /// Solves the symmetric positive definite banded system in place: `L D L^T` elimination.
-fn solve<const D: usize>(bands: &mut [[f64; 4]], right: &mut [SVector<f64, D>]) {
+pub(super) fn solve<const D: usize>(bands: &mut [[f64; 4]], right: &mut [SVector<f64, D>]) {
     let n = bands.len();
     for row in 0..n {
         let pivot = bands[row];

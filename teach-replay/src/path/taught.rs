@@ -300,3 +300,20 @@ fn a_way_back_beside_the_path_is_kept_or_refused_but_never_lost_silently() {
     }
     eprintln!("{refused} of 30 refused");
 }
+
+#[test]
+fn a_path_stays_within_the_tube_that_was_asked_for() {
+    let hand = steady_hand();
+    let clean = |metres: f64| {
+        let tube = Some(crate::Tube { metres, radians: 0.02 });
+        Path::clean(&hand.record(), label(), &Cleaning { tube, ..Cleaning::default() }).unwrap()
+    };
+    for metres in [0.001, 0.0003] {
+        let (_, report) = clean(metres);
+        assert!(report.moved_most <= metres && report.turned_most <= 0.02, "{report:?}");
+        assert!(report.moved_most > 0.2 * metres, "{report:?}");
+    }
+    let tube = Some(crate::Tube { metres: f64::NAN, radians: 0.02 });
+    let wrong = Path::clean(&hand.record(), label(), &Cleaning { tube, ..Cleaning::default() });
+    assert!(matches!(wrong, Err(PathError::Setting { name: "tube.metres", .. })));
+}
