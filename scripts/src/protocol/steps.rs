@@ -15,7 +15,10 @@ pub(super) type Outcome<T> = Result<T, Box<EvalAltResult>>;
 
 /// How each step is written, for messages.
 const USAGE: &[(&str, &str)] = &[
-    ("teach", "teach(#{ study: \"LEG-007\", side: \"left\" }), or with by: \"freedrive\", stay_within: mm(1)"),
+    (
+        "teach",
+        "teach(#{ study: \"LEG-007\", side: \"left\" }), or with by: \"freedrive\", stay_within: mm(1)",
+    ),
     ("load_path", "load_path(\"femoral.path.toml\")"),
     ("save", "path.save(\"femoral.path.toml\")"),
     ("trim", "path.trim(mm(10), mm(210))"),

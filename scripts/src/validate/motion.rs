@@ -189,7 +189,12 @@ impl Columns {
             Goal::of(format!("limits crossed in {ticks} ticks"), &[crossed], Some(0.0), None),
             Goal::of("replay against the smoothed path, RMS, mm", &self.beside_mm, Some(0.2), None),
             Goal::of("replay against the smoothed path, RMS, degrees", &self.turned_deg, Some(0.2), None),
-            Goal::of("ten replays, furthest from their mean, mm", &self.repeated_mm, Some(0.05), Some("0.20")),
+            Goal::of(
+                "ten replays, furthest from their mean, mm",
+                &self.repeated_mm,
+                Some(0.05),
+                Some("0.20"),
+            ),
             Goal::of("stop at 20 mm/s, word to rest, ms", &self.stopped[0], Some(100.0), None),
             Goal::of("stop at 20 mm/s, share of any limit", &self.stopped[1], Some(ROUNDING), None),
             Goal::of("played back: exams whose commands differ", &self.same, Some(0.0), None),
@@ -326,7 +331,8 @@ fn stopped(seed: u64, out: &Path) -> Result<[f64; 2], SessionError> {
     let first = exam.ticks.iter().position(|record| record.stamp > taught_until).unwrap_or(0);
     let word = first as u64 + TICKS_BETWEEN * watch.told.load(Ordering::SeqCst).saturating_sub(1);
     let last = exam.ticks.last().map(|record| record.commanded.clone());
-    let moving = exam.ticks.iter().rposition(|record| Some(&record.commanded) != last.as_ref()).unwrap_or(0) as u64;
+    let moving =
+        exam.ticks.iter().rposition(|record| Some(&record.commanded) != last.as_ref()).unwrap_or(0) as u64;
     // The first tick of the motion may be one or two later than `first`: then the word was as much later, and this
     // is too long by that.
     let ticks = moving.saturating_sub(word) + 1;
