@@ -35,7 +35,7 @@ pub enum Command {
     /// Between the formats of sequences (.igs.mha, .igs.mhd, .igs.nrrd), of volumes (.mha, .nrrd), and of surfaces
     /// (.stl, .ply, .vtp).
     Convert(Convert),
-    /// What the model of an arm says; forward and inverse kinematics.
+    /// What the model of an arm says; forward and inverse kinematics. Or how punctual an arm on its wire is.
     Arm(Arm),
     /// Serves the simulated cell on the protocols of a real one, until Ctrl-C.
     Simulate(Simulate),
@@ -106,8 +106,19 @@ pub struct Convert {
 /// `arm`
 #[derive(Args, Debug)]
 pub struct Arm {
-    /// A URDF file, or the name of a model that comes along: `ur5e`, `seven_joint`.
-    pub urdf: String,
+    /// A URDF file, or the name of a model that comes along: `ur5e`, `seven_joint`. With --measure the arm's address:
+    /// `ur://host`.
+    #[arg(required_unless_present = "cell")]
+    pub urdf: Option<String>,
+    /// Hold the arm still, and measure how punctual its ticks are.
+    #[arg(long, conflicts_with_all = ["base", "tip", "joints_deg", "flange_mm_deg"])]
+    pub measure: bool,
+    /// The cell: where the arm is, and what it carries.
+    #[arg(long, value_name = "CELL.toml", requires = "measure")]
+    pub cell: Option<PathBuf>,
+    /// How long to measure.
+    #[arg(long, value_name = "S", default_value_t = 10.0, requires = "measure")]
+    pub seconds: f64,
     /// The chain's first link.
     #[arg(long, value_name = "LINK")]
     pub base: Option<String>,
@@ -137,6 +148,9 @@ pub struct Simulate {
     /// What makes the clock go.
     #[arg(long, value_enum, default_value_t = Clock::Wall)]
     pub time: Clock,
+    /// Write the file with which this cell is scanned over the wire: `probepath scan --cell FILE`.
+    #[arg(long, value_name = "FILE")]
+    pub write_cell: Option<PathBuf>,
 }
 
 /// What makes a simulated cell's clock go.

@@ -5,6 +5,7 @@ mod simulate;
 
 use std::error::Error;
 
+use probepath_scripts::session::MeasureRequest;
 use probepath_scripts::{Operator, ScanRequest, offline, validate};
 
 use crate::cli::{Command, Goal};
@@ -29,17 +30,21 @@ pub fn perform(command: Command, screen: &Screen) -> Outcome {
         )?),
         Command::Compare(args) => Document::of(&offline::compare(&args.surface, &args.gold, !args.in_place)?),
         Command::Convert(args) => Document::of(&offline::convert(&args.input, &args.output)?),
-        Command::Arm(args) => Document::of(&offline::arm(&offline::ArmQuestion {
-            urdf: args.urdf,
-            base: args.base,
-            tip: args.tip,
-            joints_deg: args.joints_deg,
-            flange_mm_deg: args.flange_mm_deg,
-        })?),
         Command::Simulate(args) => return simulate::perform(args, screen),
+        Command::Arm(args) => return arm(args),
         Command::Validate(args) => return validated(&args, screen),
     };
     Ok(document?)
+}
+
+fn arm(args: crate::cli::Arm) -> Outcome {
+    let crate::cli::Arm { urdf, measure, cell, seconds, base, tip, joints_deg, flange_mm_deg } = args;
+    if measure {
+        return Ok(Document::of(&MeasureRequest { address: urdf, cell, seconds }.run()?)?);
+    }
+    let urdf = urdf.unwrap_or_default();
+    let question = offline::ArmQuestion { urdf, base, tip, joints_deg, flange_mm_deg };
+    Ok(Document::of(&offline::arm(&question)?)?)
 }
 
 fn scan(args: crate::cli::Scan, screen: &Screen) -> Outcome {

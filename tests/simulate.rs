@@ -46,7 +46,7 @@ fn it_says_what_it_serves_and_serves_it_until_ctrl_c() {
     assert_eq!((said["host"].as_str(), said["seed"].as_u64()), (Some(host.as_str()), Some(3)));
     let ports: Vec<u64> =
         said["ports"].as_array().unwrap().iter().filter_map(|p| p["port"].as_u64()).collect();
-    assert_eq!(ports, [30004, 29999, 30001, 30002, 30003]);
+    assert_eq!(ports, [30004, 29999, 30001, 30002, 30003, 18944]);
     assert!(said["arm"]["payload_kg"].as_f64().unwrap() > 0.0);
     let mut rtde = TcpStream::connect((host.as_str(), 30004)).unwrap();
     rtde.write_all(&[0, 5, b'V', 0, 2]).unwrap();

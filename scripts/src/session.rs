@@ -10,6 +10,7 @@ mod cell;
 mod error;
 mod figures;
 mod locate;
+mod measure;
 mod motion;
 mod recorded;
 mod recorder;
@@ -23,7 +24,6 @@ use std::path::{Path as FilePath, PathBuf};
 use std::sync::Arc;
 
 use probepath_frames::{Base, Pose, Stamp, World};
-use probepath_robot::drivers::Address;
 use probepath_robot::{Guard, MotionLimits, Operator, State, Trip};
 use probepath_sim::{SimulatedCell, Truth};
 use probepath_us_capture::exam::{Attachment, Event, ExamHeader, ExamWriter, Level, Pace, Written};
@@ -35,6 +35,7 @@ pub use cell::{
 };
 pub use error::SessionError;
 pub use locate::Located;
+pub use measure::{MeasureRequest, Measured, Ratio};
 pub use recorded::protocol_of;
 pub(crate) use recorded::row as recorded_row;
 pub(crate) use report::SEGMENTS;
@@ -47,12 +48,20 @@ pub use visit::{CalibrationPlan, PhantomImages, VisitWish, Visits};
 
 use crate::progress::Progress;
 use crate::protocol::Protocol;
+use crate::report::build::ReportError;
 use crate::report::{Report, SurfaceError};
 use cell::Cell;
+use motion::Punctual;
 use recorder::{Stand, Taped};
 
 /// This software, as exams and reports name it.
 pub const SOFTWARE: &str = concat!("probepath ", env!("CARGO_PKG_VERSION"));
+
+/// Speed in the air after a recovery (m/s): the guard lets the probe go at 10 mm/s at first.
+const RESUMING_M_S: f64 = 0.008;
+
+/// Name of the attachment that says how punctual the ticks of an arm on its wire were: lateness, step time, round trip.
+pub const PUNCTUAL: &str = "realtime.json";
 
 /// What a session begins with.
 pub struct Opening {
@@ -85,6 +94,10 @@ pub struct Session {
     /// How far smoothing moved the taught path (m), once one was taught.
     smoothed_m: Option<f64>,
     report: Option<Report>,
+    /// Whether nothing was moved since the arm was recovered: what comes first is slow.
+    resuming: bool,
+    /// How punctual its motions were, where the arm keeps the wall's time.
+    punctual: Option<Punctual>,
 }
 
 impl Session {
@@ -106,7 +119,10 @@ impl Session {
     /// A session of a connected cell.
     fn beside(cell: Cell, opening: Opening) -> Result<Self, SessionError> {
         let guard = cell.guard(&opening.operator)?;
+        let punctual = (cell.pace == Pace::RealTime).then(Punctual::default);
         Ok(Self {
+            resuming: false,
+            punctual,
             cell,
             guard,
             opening,
@@ -199,6 +215,7 @@ impl Session {
         let state = self.ask_where(STEP, "recover")?;
         let refused = |trip: Trip| SessionError::Ended { step: STEP, why: trip.to_string() };
         self.guard.confirm(&state).map_err(refused)?;
+        self.resuming = true;
         self.say("The arm may move again.");
         Ok(())
     }
@@ -219,6 +236,15 @@ impl Session {
     /// # Errors
     /// The first that writing met.
     pub fn close(&mut self) -> Result<Option<Written>, SessionError> {
+        if let Some(unseen) = self.punctual.as_ref().map(Punctual::unseen).filter(|unseen| *unseen > 0) {
+            self.warn(&format!(
+                "{unseen} ticks are not in the exam: this computer was too slow to record them."
+            ));
+        }
+        let punctual = self.punctual.as_ref().and_then(Punctual::text).transpose();
+        if let (Some(exam), Some(text)) = (&self.exam, punctual.map_err(ReportError::from)?) {
+            exam.attach(Attachment::new(PUNCTUAL, "application/json", text));
+        }
         Ok(self.exam.take().map(ExamWriter::finish).transpose()?)
     }
 
@@ -246,7 +272,7 @@ impl Session {
             joint_names: self.cell.facts.model.joint_names().to_vec(),
             period: self.cell.arm.period(),
         };
-        let exam = ExamWriter::create(&self.exam_path(), &header, self.pace())?;
+        let exam = ExamWriter::create(&self.exam_path(), &header, self.cell.pace)?;
         exam.attach(Attachment::urdf(self.cell.urdf.as_str()));
         exam.attach(Attachment::cell(self.cell.file.text()?));
         if let Some(calibration) = calibration {
@@ -254,16 +280,22 @@ impl Session {
         }
         exam.attach(Attachment::protocol(protocol.text.as_str()));
         self.exam = Some(exam);
-        Ok(())
+        let zeroed = self.zero_sensor();
+        if zeroed.is_err() {
+            // Not begun: the next step begins it again, and zeroes again.
+            self.exam = None;
+        }
+        zeroed
     }
 
-    /// Whether the arm waits while the disk is slow.
-    fn pace(&self) -> Pace {
-        let arm = &self.cell.file.arm;
-        match (&arm.address, arm.time) {
-            (Address::Ur { .. }, ControllerTime::Wall) => Pace::RealTime,
-            _ => Pace::Simulated,
+    /// On a wire the force sensor has a bias until somebody takes it off, and a clock of its own.
+    fn zero_sensor(&mut self) -> Result<(), SessionError> {
+        if self.cell.file.is_simulated() {
+            return Ok(());
         }
+        self.began = self.ask_where("connecting", "connect")?.stamp;
+        self.say("The force sensor is zeroed: the probe has to hang in the air, untouched.");
+        self.cell.arm.zero_sensor()
     }
 
     /// A file of this session.

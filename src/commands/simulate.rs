@@ -20,6 +20,7 @@ pub fn perform(args: Simulate, screen: &Screen) -> Outcome {
         seed: args.seed,
         host: args.host,
         simulated_time: args.time == Clock::Simulated,
+        write_cell: args.write_cell,
     })?;
     screen.ready(&Document::of(&serving)?)?;
     // The handler keeps its end for as long as the program runs.

@@ -2,14 +2,15 @@
 
 use std::fmt;
 use std::net::IpAddr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use probepath_sim::controller::{ControllerConfig, ControllerError, ControllerServer, Ports, Running, Time};
+use probepath_sim::igtl::{self, MachineServer, MachineServerConfig, MachineServerError};
 use probepath_sim::{CellError, SimulatedCell};
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::session::{CellFile, SessionError};
+use crate::session::{CellFile, ControllerTime, IGTL_PORT, SessionError};
 
 /// What is to be served, and where.
 #[derive(Clone, Debug)]
@@ -22,6 +23,8 @@ pub struct SimulateRequest {
     pub host: IpAddr,
     /// Whether the clock is the client's packages instead of the wall's.
     pub simulated_time: bool,
+    /// Where to write the cell file with which it is scanned over the wire.
+    pub write_cell: Option<PathBuf>,
 }
 
 /// A cell that is being served, until this is dropped.
@@ -41,6 +44,8 @@ pub struct Simulating {
     pub arm: ServedArm,
     #[serde(skip)]
     running: Running,
+    #[serde(skip)]
+    machine: igtl::Running,
 }
 
 /// One port.
@@ -78,6 +83,17 @@ pub enum SimulateError {
     /// The controller.
     #[error(transparent)]
     Controller(#[from] ControllerError),
+    /// The ultrasound machine.
+    #[error(transparent)]
+    Machine(#[from] MachineServerError),
+    /// The cell file that was to be written.
+    #[error("cannot write the cell file {}: {source}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
 }
 
 /// Serves a cell.
@@ -89,18 +105,36 @@ pub fn simulate(request: &SimulateRequest) -> Result<Simulating, SimulateError> 
     let cell = SimulatedCell::new(&file.simulated, request.seed)?;
     let time = if request.simulated_time { Time::Simulated } else { Time::Wall };
     let arm = described(&cell);
-    let config = ControllerConfig { host: request.host, time, ..ControllerConfig::default() };
-    let running = ControllerServer::start(cell, config)?;
+    if let Some(path) = &request.write_cell {
+        write_cell(&file.name, &cell, request, path)?;
+    }
+    let host = request.host;
+    let machine = MachineServer::start(&cell, MachineServerConfig { host, time, ..Default::default() })?;
+    let running =
+        ControllerServer::start(cell, ControllerConfig { host, time, ..ControllerConfig::default() })?;
     let ports = PORTS.map(|(port, what)| Served { port, what }).to_vec();
-    Ok(Simulating { cell: file.name, seed: request.seed, host: request.host, time, ports, arm, running })
+    Ok(Simulating { cell: file.name, seed: request.seed, host, time, ports, arm, running, machine })
 }
 
-const PORTS: [(u16, &str); 5] = [
+/// The file with which whoever comes over the wire scans the cell.
+fn write_cell(
+    name: &str,
+    cell: &SimulatedCell,
+    request: &SimulateRequest,
+    path: &Path,
+) -> Result<(), SimulateError> {
+    let time = if request.simulated_time { ControllerTime::Simulated } else { ControllerTime::Wall };
+    let text = CellFile::of_served(&format!("{name} on its wire"), cell, request.host, time).text()?;
+    std::fs::write(path, text).map_err(|source| SimulateError::Write { path: path.into(), source })
+}
+
+const PORTS: [(u16, &str); 6] = [
     (Ports::RTDE, "RTDE: real-time data, 500 Hz"),
     (Ports::DASHBOARD, "dashboard: power, brakes, protective stops, popups"),
     (Ports::PRIMARY, "primary: version, scripts"),
     (Ports::SECONDARY, "secondary: version, scripts"),
     (Ports::REALTIME, "scripts"),
+    (IGTL_PORT, "OpenIGTLink: B-scans"),
 ];
 
 fn described(cell: &SimulatedCell) -> ServedArm {
@@ -118,11 +152,18 @@ fn described(cell: &SimulatedCell) -> ServedArm {
 impl Simulating {
     /// What happened while it was served, in words.
     pub fn farewell(&self) -> String {
-        let all = self.running.counters();
+        let (all, sent) = (self.running.counters(), self.machine.sent());
         format!(
             "served {} ticks, {} packages and {} scripts to {} RTDE clients; {} packages were skipped, the clock fell \
-             behind the machine's {} times",
-            all.ticks, all.packages, all.scripts, all.rtde_clients, all.skipped, all.slips
+             behind the machine's {} times; {} B-scans left, {} were too old to",
+            all.ticks,
+            all.packages,
+            all.scripts,
+            all.rtde_clients,
+            all.skipped,
+            all.slips,
+            sent.pictures,
+            sent.stale
         )
     }
 }

@@ -1,6 +1,7 @@
 //! An arm with somebody beside it: who is told to guide it, and who lets it go on after it stopped by itself.
 
 use probepath_frames::Span;
+use probepath_robot::drivers::ur::UrArm;
 use probepath_robot::{Arm, ArmFault, Command, RecordedArm, Row, State};
 use probepath_sim::{SimulatedArm, SimulatedCell};
 
@@ -8,9 +9,17 @@ use super::SessionError;
 
 /// The arm of a cell, and the person beside it.
 pub(super) trait Bedside: Arm + Send {
+    /// Takes the force sensor's bias off, the probe in the air and the arm at rest, where connecting has not done so.
+    fn zero_sensor(&mut self) -> Result<(), SessionError> {
+        Ok(())
+    }
+
     /// Asks whoever stands beside it to take the probe and guide it, where the arm itself has a way to say so (a
     /// pendant).
     fn ask_to_guide(&mut self, text: &str) -> Result<(), SessionError>;
+
+    /// The probe was let go.
+    fn done_guiding(&mut self) {}
 
     /// After it stopped by itself: makes it ready to move again, and says what was done. Nothing moves.
     fn recover(&mut self) -> Result<String, SessionError>;
@@ -53,6 +62,34 @@ impl Arm for SimulatedBedside {
 
     fn joints(&self) -> usize {
         self.arm.joints()
+    }
+}
+
+/// A UR on its wire, its pendant in place of a voice.
+impl Bedside for UrArm {
+    fn zero_sensor(&mut self) -> Result<(), SessionError> {
+        Ok(UrArm::zero_sensor(self)?)
+    }
+
+    fn ask_to_guide(&mut self, text: &str) -> Result<(), SessionError> {
+        Ok(self.popup(text)?)
+    }
+
+    fn done_guiding(&mut self) {
+        // Words that stay on the pendant harm nobody.
+        let _ = self.close_popup();
+    }
+
+    fn recover(&mut self) -> Result<String, SessionError> {
+        if self.fault().is_none() {
+            return Ok("The arm says that nothing stopped it.".into());
+        }
+        UrArm::recover(self)?;
+        let version = &self.report().version;
+        Ok(format!(
+            "The controller (PolyScope {version}) was unlocked and connected anew; our program runs; nothing goes on by \
+             itself."
+        ))
     }
 }
 

@@ -5,15 +5,19 @@ mod file;
 mod line;
 mod machine;
 mod pose;
+mod served;
 mod workspace;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use probepath_frames::{Direction, Image, Point, Pose, Probe, Span, World};
 use probepath_robot::drivers::Address;
+use probepath_robot::drivers::ur::{UrArm, UrSettings};
 use probepath_robot::{
-    Guard, GuardLimits, Joints, Model, MotionLimits, Operator, Plane, Workspace, probe_place,
+    Guard, GuardLimits, Joints, Model, MotionLimits, Operator, Plane, Tilt, Workspace, probe_place,
 };
 use probepath_sim::{Bench, SimulatedCell};
+use probepath_us_capture::exam::Pace;
+use probepath_us_capture::igtl::{IgtlSettings, IgtlSource, Wait};
 use probepath_us_capture::{BScanSource, Calibration, CalibrationError, Setting};
 
 pub use arm::{ArmFile, ControllerTime};
@@ -44,6 +48,8 @@ pub(super) struct Cell {
     /// The simulated cell behind arm and machine, where they are simulated in this process: its truth is asked after
     /// the reconstruction.
     pub(super) simulated: Option<SimulatedCell>,
+    /// Whether the arm waits while the disk is slow.
+    pub(super) pace: Pace,
 }
 
 /// What is known of a cell before anything is connected.
@@ -95,6 +101,24 @@ impl Described {
     }
 }
 
+/// Connects to a UR controller.
+fn ur(file: &CellFile, host: &str, facts: &Facts) -> Result<UrArm, SessionError> {
+    let refused = |wrong: line::Wrong| SessionError::Cell { file: file.name.clone(), why: wrong.told("") };
+    let carried = file.arm.carried().map_err(refused)?;
+    let centre = Vector3::from(carried.centre_of_gravity_m);
+    let usual = UrSettings::new(facts.model.clone(), facts.flange_from_probe, carried.payload_kg, centre);
+    let settings = UrSettings { stepped: file.arm.time == ControllerTime::Simulated, ..usual };
+    Ok(UrArm::connect(host, settings)?)
+}
+
+/// Connects to an ultrasound machine.
+fn igtl(file: &CellFile, host: &str, port: u16, setting: Setting) -> Result<IgtlSource, SessionError> {
+    let (host, device) = (host.to_owned(), file.machine.device.clone());
+    let clock = file.machine.clock.unwrap_or_default().of_stamps();
+    let wait = if file.arm.time == ControllerTime::Simulated { Wait::ForMarks } else { Wait::Never };
+    Ok(IgtlSource::connect(IgtlSettings { host, port, device, setting, clock, wait })?)
+}
+
 /// Where the image is on the probe by the holder's drawing: its middle column under the middle of the face, rows along
 /// the beam.
 fn as_drawn(setting: &Setting) -> Pose<Probe, Image> {
@@ -114,7 +138,17 @@ impl Cell {
     pub(super) fn connect(file: &CellFile, seed: u64) -> Result<Self, SessionError> {
         match &file.arm.address {
             Address::Simulated => Self::simulated(file, seed),
-            Address::Ur { .. } => Err(SessionError::Order("no arm on its wire can be driven yet")),
+            Address::Ur { host } => Self::on_its_wire(file, host),
+        }
+    }
+
+    /// The arm of a cell, and nothing else of it.
+    pub(super) fn arm_alone(file: &CellFile) -> Result<Box<dyn Bedside>, SessionError> {
+        match &file.arm.address {
+            Address::Simulated => {
+                Ok(Box::new(SimulatedBedside::new(&SimulatedCell::new(&file.simulated, 1)?)))
+            }
+            Address::Ur { host } => Ok(Box::new(ur(file, host, &Described::on_its_wire(file, None)?.facts)?)),
         }
     }
 
@@ -137,6 +171,22 @@ impl Cell {
         Self::of(file, Described::on_its_wire(file, urdf)?, arm, machine, None)
     }
 
+    /// A cell whose arm, and machine if there is one, are reached over their wires.
+    fn on_its_wire(file: &CellFile, host: &str) -> Result<Self, SessionError> {
+        let described = Described::on_its_wire(file, None)?;
+        // The machine first: the arm is the one that would stand there waiting.
+        let machine = match (&file.machine.address, described.image) {
+            (MachineAddress::Igtl { host, port }, Some((setting, _))) => {
+                Some(Box::new(igtl(file, host, *port, setting)?) as Box<dyn BScanSource + Send>)
+            }
+            _ => None,
+        };
+        let arm = Box::new(ur(file, host, &described.facts)?);
+        let cell = Self::of(file, described, arm, machine, None)?;
+        let pace = if file.arm.time == ControllerTime::Wall { Pace::RealTime } else { Pace::Simulated };
+        Ok(Self { pace, ..cell })
+    }
+
     /// The cell that is simulated in this process.
     fn simulated(file: &CellFile, seed: u64) -> Result<Self, SessionError> {
         let simulated = SimulatedCell::new(&file.simulated, seed)?;
@@ -157,7 +207,20 @@ impl Cell {
         let calibration = described.image.map(|image| calibration(file, image)).transpose()?;
         let Described { facts, urdf, image_latency, bench, .. } = described;
         let file = file.clone();
-        Ok(Self { file, arm, machine, facts, limits, calibration, urdf, image_latency, bench, simulated })
+        let pace = Pace::Simulated;
+        Ok(Self {
+            file,
+            arm,
+            machine,
+            facts,
+            limits,
+            calibration,
+            urdf,
+            image_latency,
+            bench,
+            simulated,
+            pace,
+        })
     }
 
     /// The calibration of the machine.
@@ -176,6 +239,7 @@ impl Cell {
         Ok(Guard::new(self.guard_limits(), self.limits)
             .map_err(wrong)?
             .within(self.workspace(), place)
+            .leaning_at_most(self.tilt())
             .listening_to(operator.clone()))
     }
 
@@ -186,6 +250,14 @@ impl Cell {
         let up = Direction::<World>::y().reversed();
         let table = Plane { through: base_from_world * above, inward: base_from_world * up };
         self.file.workspace.with(Workspace::new().and(table), &base_from_world)
+    }
+
+    /// How far the probe may lean over.
+    fn tilt(&self) -> Tilt {
+        let base_from_world = self.facts.world_from_base.inverse();
+        let usual = Tilt::around(base_from_world * Direction::<World>::y());
+        let most_rad = self.file.workspace.tilt_deg.map_or(usual.most_rad, f64::to_radians);
+        Tilt { most_rad, ..usual }
     }
 
     /// What the guard watches for while the arm moves by itself.
@@ -237,13 +309,24 @@ fn nominal_calibration(
         phantom: "none: the holder's drawing".into(),
         probe_from_image,
         setting,
-        image_lag: Span::ZERO,
+        image_lag: nominal_lag(&file.machine),
         error: CalibrationError {
             rms_mm: file.machine.holder_error_mm.unwrap_or(simulated_mm),
             sd_mm: 0.0,
             held_out: false,
         },
         quality: None,
+    }
+}
+
+/// What is known of the lag before anybody calibrated: a machine's own clock is brought to the arm's by when B-scans
+/// arrive, so that a B-scan is stamped as late as it is under way.
+fn nominal_lag(machine: &MachineFile) -> Span {
+    match (&machine.address, machine.clock.unwrap_or_default()) {
+        (MachineAddress::Igtl { .. }, MachineClock::Own) => {
+            Span::from_seconds(-machine.latency_ms.unwrap_or_default() * 1e-3)
+        }
+        _ => Span::ZERO,
     }
 }
 

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use probepath_recon::ReconError;
 use probepath_robot::RunError;
+use probepath_robot::drivers::ur::UrError;
 use probepath_sim::CellError;
 use probepath_teach_replay::{GuideError, PathError, PlanError, ReplayError};
 use probepath_us_capture::exam::ExamError;
@@ -11,7 +12,7 @@ use probepath_us_capture::plan::NoPlan;
 use probepath_us_capture::pointer::PointerError;
 use probepath_us_capture::shots::BadShots;
 use probepath_us_capture::spatial::SpatialError;
-use probepath_us_capture::{BadCalibration, CaptureError};
+use probepath_us_capture::{BadCalibration, CaptureError, SourceFault};
 use thiserror::Error;
 
 use crate::report::build::ReportError;
@@ -31,6 +32,12 @@ pub enum SessionError {
     /// The simulated cell cannot be built.
     #[error("the simulated cell cannot be built: {0}")]
     Simulated(#[from] CellError),
+    /// The arm on its wire.
+    #[error(transparent)]
+    Arm(#[from] UrError),
+    /// The ultrasound machine on its wire.
+    #[error(transparent)]
+    Machine(#[from] SourceFault),
     /// A file that cannot be read or written.
     #[error("cannot {doing} {}: {source}", path.display())]
     File {

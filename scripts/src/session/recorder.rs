@@ -4,12 +4,13 @@
 use std::borrow::Cow;
 
 use probepath_frames::{Base, Flange, Pose, Probe, Span, Stamp, Track, World};
-use probepath_robot::{Arm, ArmFault, Command, Joints, Model, Observer, Operator, Safety, State, Tick, Wish};
+use probepath_robot::{Arm, ArmFault, Command, Joints, Model, Operator, Safety, State, Tick, Wish};
 use probepath_teach_replay::{Recording, Sample};
 use probepath_us_capture::exam::{ExamWriter, Row, TickRecord};
 use probepath_us_capture::{BScanSource, Capture, CaptureError, PlacedBScan};
 
 use super::figures::Figures;
+use super::motion::Watcher;
 use crate::progress::Progress;
 
 /// Where a motion is, as its controller says it.
@@ -52,26 +53,7 @@ pub(super) struct Taped<'a> {
 impl Arm for Taped<'_> {
     fn exchange(&mut self, command: &Command) -> Result<State, ArmFault> {
         let state = self.arm.exchange(command)?;
-        let base_from_probe = self.facts.base_from_probe(&state.position);
-        self.exam.tick(TickRecord {
-            tick: state.tick,
-            stamp: state.stamp,
-            command: match command {
-                Command::Stay | Command::Freedrive => None,
-                Command::Position(joints) => Some(row(joints)),
-            },
-            position: row(&state.position),
-            velocity: row(&state.velocity),
-            commanded: row(&state.commanded),
-            wrench: state.wrench,
-            guiding: state.guiding,
-            phase: Cow::Borrowed((self.stand)().phase),
-            world_from_probe: Some(self.facts.world_from_base * base_from_probe),
-            // Nothing where all is well, so that it takes no room.
-            safety: Cow::Borrowed(if state.safety == Safety::Normal { "" } else { state.safety.name() }),
-            freedrive: *command == Command::Freedrive,
-            age: state.age,
-        });
+        self.exam.tick(record(command, &state, &(self.stand)(), self.facts));
         Ok(state)
     }
 
@@ -81,6 +63,30 @@ impl Arm for Taped<'_> {
 
     fn joints(&self) -> usize {
         self.arm.joints()
+    }
+}
+
+/// One exchange as the exam keeps it.
+pub(super) fn record(command: &Command, state: &State, stand: &Stand, facts: &Facts) -> TickRecord {
+    let base_from_probe = facts.base_from_probe(&state.position);
+    TickRecord {
+        tick: state.tick,
+        stamp: state.stamp,
+        command: match command {
+            Command::Stay | Command::Freedrive => None,
+            Command::Position(joints) => Some(row(joints)),
+        },
+        position: row(&state.position),
+        velocity: row(&state.velocity),
+        commanded: row(&state.commanded),
+        wrench: state.wrench,
+        guiding: state.guiding,
+        phase: Cow::Borrowed(stand.phase),
+        world_from_probe: Some(facts.world_from_base * base_from_probe),
+        // Nothing where all is well, so that it takes no room.
+        safety: Cow::Borrowed(if state.safety == Safety::Normal { "" } else { state.safety.name() }),
+        freedrive: *command == Command::Freedrive,
+        age: state.age,
     }
 }
 
@@ -116,7 +122,6 @@ pub(super) struct Recorder<'a> {
     pub(super) facts: &'a Facts,
     pub(super) progress: &'a dyn Progress,
     pub(super) step: &'static str,
-    pub(super) stand: &'a dyn Fn() -> Stand,
     pub(super) recording: Option<&'a mut Recording>,
     /// Where the probe was at every tick.
     pub(super) track: Option<&'a mut Track<World, Probe>>,
@@ -129,9 +134,9 @@ pub(super) struct Recorder<'a> {
 /// The bar moves five times a second of exam time.
 const TICKS_BETWEEN_BARS: u64 = 100;
 
-impl Observer for Recorder<'_> {
-    fn tick(&mut self, tick: &Tick) -> Wish {
-        let (stand, state) = ((self.stand)(), &tick.state);
+impl Watcher for Recorder<'_> {
+    fn see(&mut self, tick: &Tick, stand: &Stand) -> Wish {
+        let state = &tick.state;
         let base_from_probe = self.facts.base_from_probe(&state.position);
         self.now = state.stamp;
         if let Some(recording) = &mut self.recording {
@@ -144,7 +149,7 @@ impl Observer for Recorder<'_> {
         if let Some(figures) = &mut self.figures
             && !tick.braking
         {
-            figures.tick(tick, &stand, &base_from_probe);
+            figures.tick(tick, stand, &base_from_probe);
         }
         if tick.index.is_multiple_of(TICKS_BETWEEN_BARS) {
             self.progress.at(self.step, stand.fraction);

@@ -13,8 +13,9 @@ use probepath_us_capture::exam::Attachment;
 use probepath_us_capture::{Capture, Counts, Keeping, PlacedBScan};
 
 use super::figures::Figures;
-use super::recorder::{Eye, LATEST, Recorder, Stand, Taped};
-use super::{Session, SessionError, motion};
+use super::motion::Motion;
+use super::recorder::{Eye, LATEST, Recorder, Stand};
+use super::{RESUMING_M_S, Session, SessionError, motion};
 use crate::report::PathFigures;
 use crate::report::build::{ReportError, ScanFigures};
 
@@ -166,10 +167,12 @@ impl Session {
     }
 
     fn plan(&mut self, path: &Path, wish: &ScanWish) -> Result<Plan, SessionError> {
+        let usual = PlanSettings::default();
         let settings = PlanSettings {
             speed: PathSpeed::gentle(wish.speed_m_s),
             workspace: self.cell.workspace(),
-            ..PlanSettings::default()
+            air_speed: if self.resuming { RESUMING_M_S } else { usual.air_speed },
+            ..usual
         };
         let state = self.ask_where("planning", "plan")?;
         Ok(Plan::new(path, &self.cell.probe_arm(), &state.commanded, &settings)?)
@@ -195,7 +198,9 @@ impl Session {
         let stand = || stand_of(&watch.status(), length);
         let exam = self.exam.as_ref().ok_or(SessionError::Order("the exam was not begun"))?;
         let facts = &self.cell.facts;
-        let mut taped = Taped { arm: &mut *self.cell.arm, exam, facts, stand: &stand };
+        let arm = &mut *self.cell.arm;
+        let punctual = self.punctual.as_mut();
+        let moving = Motion { step: "scanning", arm, exam, facts, stand: &stand, punctual };
         let (paused, looked, latest) = (false, None, LATEST);
         let eye = match (capture, self.cell.machine.as_mut()) {
             (None, _) => None,
@@ -215,15 +220,15 @@ impl Session {
             facts,
             progress: &*self.opening.progress,
             step: "scanning",
-            stand: &stand,
             recording: None,
             track: None,
             eye,
             figures: Some(figures),
             now: self.now,
         };
-        let done = motion::perform("scanning", &mut taped, &mut replay, &mut self.guard, &mut recorder);
+        let done = motion::perform(moving, &mut replay, &mut self.guard, &mut recorder);
         self.now = recorder.now;
+        self.resuming &= done.is_err();
         if let Err(SessionError::Motion { source, .. }) = &done
             && source.reason.asks_to_lift()
         {
@@ -239,16 +244,16 @@ impl Session {
     /// After too much force: the probe comes off the skin along its own axis, and the force may only fall.
     fn lift(&mut self) -> Result<(), SessionError> {
         const STEP: &str = "lifting off";
-        let exam = self.exam.as_ref().ok_or(SessionError::Order("the exam was not begun"))?;
         let stand = || Stand { phase: "lift", along_m: None, look: false, fraction: 1.0 };
         let mut lift = LiftOff::new(self.cell.probe_arm(), LIFT_M, LIFT_M_S).map_err(ReplayError::from)?;
-        let facts = &self.cell.facts;
-        let mut taped = Taped { arm: &mut *self.cell.arm, exam, facts, stand: &stand };
-        let state = motion::ask(STEP, &mut taped)?;
+        let state = self.ask_where(STEP, "lift")?;
         self.guard
             .confirm_to_lift(&state)
             .map_err(|trip| SessionError::Ended { step: STEP, why: trip.to_string() })?;
-        motion::perform(STEP, &mut taped, &mut lift, &mut self.guard, &mut ())
+        let exam = self.exam.as_ref().ok_or(SessionError::Order("the exam was not begun"))?;
+        let (arm, facts) = (&mut *self.cell.arm, &self.cell.facts);
+        let moving = Motion { step: STEP, arm, exam, facts, stand: &stand, punctual: self.punctual.as_mut() };
+        motion::perform(moving, &mut lift, &mut self.guard, &mut ())
     }
 
     /// What the capture still held back at the end.

@@ -9,7 +9,8 @@ use probepath_teach_replay::{
 };
 use probepath_us_capture::exam::Attachment;
 
-use super::recorder::{Recorder, Stand, Taped};
+use super::motion::Motion;
+use super::recorder::{Recorder, Stand};
 use super::{Session, SessionError, motion};
 
 /// How a path is to be taught.
@@ -48,7 +49,19 @@ const MOST_SAMPLES: usize = 300_000;
 /// What whoever holds the probe is told.
 const GUIDE: &str = "Hold the switch, guide the probe along the artery, lift it off, let go.";
 
+/// The same on an arm's pendant, whose switch is the teach button.
+const PENDANT: &str = "probepath: hold the teach button and guide the probe along the artery. Lift it off at its end, \
+                       then release the button.";
+
 impl GuideBy {
+    /// What the guard watches for meanwhile.
+    fn guard_limits(self) -> GuardLimits {
+        match self {
+            Self::Compliance => GuardLimits::hand_guiding(),
+            Self::Freedrive => GuardLimits::freedrive(),
+        }
+    }
+
     /// What the exam calls its ticks.
     const fn stand(self) -> Stand {
         let phase = match self {
@@ -68,8 +81,10 @@ impl Session {
         self.begin_exam(&wish.study)?;
         self.say(GUIDE);
         let mut recording = Recording::with_capacity(MOST_SAMPLES);
-        self.cell.arm.ask_to_guide(GUIDE)?;
-        self.guide(wish.by, &mut recording)?;
+        self.cell.arm.ask_to_guide(PENDANT)?;
+        let guided = self.guide(wish.by, &mut recording);
+        self.cell.arm.done_guiding();
+        guided?;
         let label = Label {
             study: wish.study.clone(),
             side: wish.side,
@@ -93,31 +108,32 @@ impl Session {
     }
 
     fn guide(&mut self, by: GuideBy, recording: &mut Recording) -> Result<(), SessionError> {
+        const STEP: &str = "teaching";
         let arm = self.cell.probe_arm();
         let usual = *self.guard.limits();
-        self.guard.set_limits(self.cell.as_the_file_says(GuardLimits::hand_guiding()));
         let stand = || by.stand();
-        let exam = self.exam.as_ref().ok_or(SessionError::Order("the exam was not begun"))?;
-        let facts = &self.cell.facts;
-        let mut taped = Taped { arm: &mut *self.cell.arm, exam, facts, stand: &stand };
-        let start = motion::ask("teaching", &mut taped)?.commanded;
-        let mut controller: Box<dyn Controller> = match by {
+        let start = self.ask_where(STEP, by.stand().phase)?.commanded;
+        let mut controller: Box<dyn Controller + Send> = match by {
             GuideBy::Compliance => Box::new(HandGuide::new(arm, &start, GiveWay::default())?),
             GuideBy::Freedrive => Box::new(Freedrive::new(arm.period.seconds())),
         };
+        let exam = self.exam.as_ref().ok_or(SessionError::Order("the exam was not begun"))?;
+        let facts = &self.cell.facts;
+        self.guard.set_limits(self.cell.as_the_file_says(by.guard_limits()));
+        let (arm, punctual) = (&mut *self.cell.arm, self.punctual.as_mut());
+        let moving = Motion { step: STEP, arm, exam, facts, stand: &stand, punctual };
         let mut recorder = Recorder {
             exam,
             facts,
             progress: &*self.opening.progress,
-            step: "teaching",
-            stand: &stand,
+            step: STEP,
             recording: Some(recording),
             track: None,
             eye: None,
             figures: None,
             now: self.now,
         };
-        let done = motion::perform("teaching", &mut taped, &mut *controller, &mut self.guard, &mut recorder);
+        let done = motion::perform(moving, &mut *controller, &mut self.guard, &mut recorder);
         self.now = recorder.now;
         self.guard.set_limits(usual);
         done

@@ -9,7 +9,8 @@ use probepath_us_capture::spatial::Spatial;
 use probepath_us_capture::{Capture, Counts, Keeping, PlacedBScan, Setting};
 
 use super::locate::Located;
-use super::recorder::{Eye, Recorder, Stand, Taped};
+use super::motion::Motion;
+use super::recorder::{Eye, Recorder, Stand};
 use super::{Session, SessionError, motion};
 
 const STEP: &str = "visiting the phantom";
@@ -211,7 +212,8 @@ impl Session {
         let stand = || stand_of(&watch.status());
         let exam = self.exam.as_ref().ok_or(SessionError::Order("the exam was not begun"))?;
         let (facts, operator) = (&self.cell.facts, self.opening.operator.clone());
-        let mut taped = Taped { arm: &mut *self.cell.arm, exam, facts, stand: &stand };
+        let arm = &mut *self.cell.arm;
+        let moving = Motion { step: STEP, arm, exam, facts, stand: &stand, punctual: self.punctual.as_mut() };
         let eye = Eye {
             machine: &mut **self.cell.machine.as_mut().ok_or(SessionError::NoMachine)?,
             capture: &mut capture,
@@ -226,14 +228,13 @@ impl Session {
             facts,
             progress: &*self.opening.progress,
             step: STEP,
-            stand: &stand,
             recording: None,
             track: Some(&mut track),
             eye: Some(eye),
             figures: None,
             now: self.now,
         };
-        let done = motion::perform(STEP, &mut taped, &mut round, &mut self.guard, &mut recorder);
+        let done = motion::perform(moving, &mut round, &mut self.guard, &mut recorder);
         self.now = recorder.now;
         done?;
         if watch.status().phase == RoundPhase::StartMoved {

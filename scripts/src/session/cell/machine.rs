@@ -2,14 +2,14 @@
 
 use std::fmt;
 
-use probepath_us_capture::{PixelSpacing, Setting};
+use probepath_us_capture::{PixelSpacing, Setting, igtl};
 use serde::{Deserialize, Serialize};
 
 use super::arm::is_host;
 use super::line::{Wrong, positive, within};
 
 /// `OpenIGTLink`'s own port.
-pub const IGTL_PORT: u16 = 18944;
+pub const IGTL_PORT: u16 = igtl::PORT;
 
 /// Where the ultrasound machine is.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -35,9 +35,20 @@ pub enum MachineAddress {
 pub enum MachineClock {
     /// The arm's controller's: a B-scan's stamp is when it was formed.
     Arm,
-    /// Its own: a B-scan was formed `latency_ms` before it arrived.
+    /// Its own: brought to the arm's by when B-scans arrive, so that they are stamped late by as long as they are under
+    /// way; until somebody calibrated, that is taken to be `latency_ms`.
     #[default]
     Own,
+}
+
+impl MachineClock {
+    /// As the wire's source has it.
+    pub(super) const fn of_stamps(self) -> igtl::MachineClock {
+        match self {
+            Self::Arm => igtl::MachineClock::OfArm,
+            Self::Own => igtl::MachineClock::Own,
+        }
+    }
 }
 
 /// The ultrasound machine of a cell.
@@ -46,6 +57,9 @@ pub enum MachineClock {
 pub struct MachineFile {
     /// `sim`, `igtl://host`, or `none`.
     pub address: MachineAddress,
+    /// Only B-scans of the device of this name; any when there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub device: Option<String>,
     /// From the echoes to the arrival of the B-scan (ms).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub latency_ms: Option<f64>,
@@ -100,6 +114,7 @@ impl MachineFile {
 
     fn says_nothing(&self) -> Result<(), Wrong> {
         let given = [
+            ("machine.device", self.device.is_some()),
             ("machine.latency_ms", self.latency_ms.is_some()),
             ("machine.clock", self.clock.is_some()),
             ("machine.holder_error_mm", self.holder_error_mm.is_some()),

@@ -229,3 +229,33 @@ fn the_file_says_how_old_a_state_may_be_in_every_motion() {
         GuardLimits::hand_guiding()
     );
 }
+
+#[test]
+fn the_shipped_cell_is_what_the_simulated_one_says_of_itself() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../cells/ur_sim.toml");
+    let shipped = CellFile::read(Path::new(path)).unwrap();
+    let simulated = SimulatedCell::new(&CellFile::default().simulated, 1).unwrap();
+    let host = std::net::IpAddr::V4(std::net::Ipv4Addr::LOCALHOST);
+    let served = CellFile::of_served(&shipped.name, &simulated, host, ControllerTime::Wall);
+    let [ours, theirs] = [&shipped, &served].map(|file| Described::on_its_wire(file, None).unwrap());
+    let off =
+        |a: &Pose<World, probepath_frames::Base>, b: &Pose<World, probepath_frames::Base>| a.distance(b);
+    let (m, rad) = off(&ours.facts.world_from_base, &theirs.facts.world_from_base);
+    assert!(m < 1e-9 && rad < 1e-7, "{m} m, {rad} rad");
+    let (m, rad) = ours.facts.flange_from_probe.distance(&theirs.facts.flange_from_probe);
+    assert!(m < 1e-9 && rad < 1e-7, "{m} m, {rad} rad");
+    let [ours, theirs] = [&shipped, &served].map(|file| file.machine.setting.unwrap().metres());
+    assert!((ours.spacing.y_m - theirs.spacing.y_m).abs() < 1e-15);
+    assert!((ours.depth_m - theirs.depth_m).abs() < 1e-12);
+    assert!((ours.window_top_m - theirs.window_top_m).abs() < 1e-12);
+    // Everything else to the letter.
+    let alike = |file: &CellFile| {
+        let mut file = file.clone();
+        (file.arm.world_from_base, file.arm.flange_from_probe) = (None, None);
+        (file.machine.setting, file.workspace, file.folder) =
+            (None, WorkspaceFile::default(), Default::default());
+        file
+    };
+    assert_eq!(alike(&shipped), alike(&served));
+    assert!(shipped.text().is_ok_and(|text| CellFile::parse(&text, "again").is_ok()));
+}

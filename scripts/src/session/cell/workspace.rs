@@ -17,6 +17,9 @@ pub struct WorkspaceFile {
     /// A box along the World's axes.
     #[serde(rename = "box", skip_serializing_if = "Option::is_none")]
     pub bounds: Option<BoxFile>,
+    /// How far the probe may lean over from looking straight down (degrees); 60 when nothing is said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tilt_deg: Option<f64>,
     /// Planes that it stays on one side of.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub planes: Vec<PlaneFile>,
@@ -47,6 +50,9 @@ type Side = (Point<World>, Direction<World>);
 
 impl WorkspaceFile {
     pub(super) fn check(&self) -> Result<(), Wrong> {
+        if let Some(tilt_deg) = self.tilt_deg {
+            within("workspace.tilt_deg", tilt_deg, (1.0, 90.0), "degrees")?;
+        }
         self.planes().map(drop)
     }
 

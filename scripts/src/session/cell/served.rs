@@ -1,0 +1,49 @@
+//! The cell file of a simulated cell that is served on its wire: what a client has to know of it.
+
+use std::net::IpAddr;
+
+use probepath_sim::{ArmKind, SimulatedCell};
+
+use super::arm::{ArmFile, ControllerTime};
+use super::file::CellFile;
+use super::machine::{IGTL_PORT, MachineAddress, MachineClock, MachineFile, SettingFile};
+use super::pose::PoseFile;
+use probepath_robot::drivers::Address;
+
+impl CellFile {
+    /// The file with which a simulated cell is scanned over its wire, when it is served at `host`: what its own file
+    /// says of arm and machine, and nothing of the truth.
+    pub fn of_served(name: &str, cell: &SimulatedCell, host: IpAddr, time: ControllerTime) -> Self {
+        let (nominal, config) = (cell.nominal(), cell.config());
+        let host = host.to_string();
+        let tool = config.arm.tool;
+        let model = match config.arm.kind {
+            ArmKind::Ur5e => "ur5e",
+            ArmKind::SevenJoint => "seven_joint",
+        };
+        let arm = ArmFile {
+            address: Address::Ur { host: host.clone() },
+            model: Some(model.into()),
+            payload_kg: Some(tool.mass_kg),
+            centre_of_gravity_mm: Some(tool.centre_of_gravity_mm),
+            // A shared computer is late now and then, the simulated controller as well as we.
+            heartbeat_ms: Some(SERVED_HEARTBEAT_MS),
+            time,
+            world_from_base: Some(PoseFile::of(&nominal.world_from_base)),
+            flange_from_probe: Some(PoseFile::of(&nominal.flange_from_probe)),
+            ..ArmFile::default()
+        };
+        let machine = MachineFile {
+            address: MachineAddress::Igtl { host, port: IGTL_PORT },
+            device: None,
+            latency_ms: Some(nominal.image_latency.seconds() * 1e3),
+            clock: Some(MachineClock::Arm),
+            holder_error_mm: Some(config.machine.calibration_error_mm),
+            setting: Some(SettingFile::of(&nominal.setting)),
+        };
+        Self { name: name.into(), arm, machine, ..Self::default() }
+    }
+}
+
+/// How late a state of a simulated controller on the same computer may be (ms).
+const SERVED_HEARTBEAT_MS: f64 = 40.0;
