@@ -83,6 +83,11 @@ impl Session {
         }
     }
 
+    /// Whether it gets data packages.
+    pub(super) const fn is_started(&self) -> bool {
+        self.started
+    }
+
     /// Some bytes came, however they were split.
     pub(super) fn hear(&mut self, bytes: &[u8], controller: &mut Controller, owners: &mut Owners) -> Heard {
         let mut heard = Heard::default();

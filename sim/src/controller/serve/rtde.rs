@@ -78,10 +78,12 @@ impl World {
         heard
     }
 
-    /// How often the input that paces the program was written, while its client is there.
+    /// How often the input that paces the program was written, while its client is there and listens: one that has
+    /// not said START yet would miss the package that it has to answer.
     pub(super) fn pulses(&self) -> Option<u64> {
         let index = self.controller.pulse()?;
-        self.owners.contains_key(&format!("input_int_register_{index}")).then_some(())?;
+        let owner = self.owners.get(&format!("input_int_register_{index}"))?;
+        self.clients.get(owner).filter(|client| client.session.is_started())?;
         self.pulses.get(index).copied()
     }
 

@@ -248,6 +248,22 @@ fn in_simulated_time_the_same_packages_give_the_same_states() {
     assert_eq!(rows(8), rows(9));
 }
 
+#[test]
+fn in_simulated_time_a_client_that_starts_late_misses_nothing() {
+    let running = serve(11, Time::Simulated, WireKnobs::default());
+    let mut client = Client::connect(&running);
+    client.send(b'I', registers::INPUTS.as_bytes());
+    assert_eq!(client.reply(b'I')[0], 1);
+    let mut scripts = TcpStream::connect((running.host(), Ports::SECONDARY)).unwrap();
+    scripts.write_all(GIVEN.text().as_bytes()).unwrap();
+    until(|| running.counters().scripts == 1);
+    client.send(b'S', &[]);
+    assert_eq!(client.row().unwrap().step, 1);
+    let fields: Vec<u8> = [&[1][..], &1_i32.to_be_bytes(), &[0; 8 + 48]].concat();
+    client.send(b'U', &fields);
+    assert_eq!(client.row().unwrap().step, 2, "a tick for the package, and no other");
+}
+
 /// Until something is so; generous, as the machine may be loaded.
 fn until(is_so: impl Fn() -> bool) {
     let began = Instant::now();
