@@ -134,3 +134,38 @@ fn the_contact_law_and_the_limits_at_a_wall_touch_no_heap() {
     });
     assert_eq!(down.phase(), TouchDownPhase::Held);
 }
+
+#[test]
+fn a_step_along_a_path_with_six_and_seven_joints_touches_no_heap() {
+    use probepath_robot::step::{Behind, PathStep, StepSettings, Stepper};
+    // FRAMES: a probe of 150 mm, straight out of the flange.
+    let flange_from_probe = Pose::<Flange, Probe>::assume(Isometry3::translation(0.0, 0.0, 0.15));
+    for model in [Model::ur5e(), Model::seven_joint()] {
+        let bent = Joints::from_slice(&[0.3, -0.8, 1.1, -1.6, 0.9, 1.4, 0.2][..model.joints()]).unwrap();
+        let from = model.forward(&bent) * flange_from_probe;
+        let x = from.origin().vector().x;
+        // The way leads through a plane, so that it is slowed down too.
+        let wall =
+            Plane { through: Point::<Base>::new(x + 0.01, 0.0, 0.0), inward: Direction::x().reversed() };
+        let settings = StepSettings { workspace: Workspace::new().and(wall), ..StepSettings::default() };
+        let limits = limits(&model);
+        let mut stepper = Stepper::at_rest(model, flange_from_probe, limits, PERIOD, bent, settings).unwrap();
+        let (mut behind, mut clock, mut held) = (Behind::default(), 0.0, 0);
+        assert_no_alloc(|| {
+            for tick in 0..2000 {
+                clock += behind.scale() * 2e-5 * (f64::from(tick) / 500.0).min(1.0);
+                let (place, aim) = (behind.place(), behind.aim(clock, 0.002));
+                let [still, ahead] = [place, aim].map(|s| {
+                    let mut pose = *from.isometry();
+                    pose.translation.vector.x += s;
+                    // FRAMES: the probe where it began, moved along the base's x axis.
+                    Pose::<Base, Probe>::assume(pose)
+                });
+                let stepped = stepper.step(&PathStep { still, ahead, freedom: 1.0 }).unwrap();
+                behind.went(&stepped);
+                held += i32::from(stepped.binding.is_some());
+            }
+        });
+        assert!(held > 100, "{held}");
+    }
+}

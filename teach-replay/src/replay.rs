@@ -1,10 +1,10 @@
 //! [`Replay`]: through the air, down, along the path at constant force, and up.
 
 mod contact;
+mod joints;
 mod settings;
 mod status;
 
-use probepath_robot::motion::follow::Curve;
 use probepath_robot::motion::timing::PathClock;
 use probepath_robot::{
     Asked, Command, ContactLaw, ContactSettings, Controller, Joints, Operator, Safety, State,
@@ -12,8 +12,8 @@ use probepath_robot::{
 
 use crate::Plan;
 use crate::plan::Leg;
-use crate::probe_arm::along_z;
 use contact::Touch;
+use joints::OnPath;
 pub use settings::{ReplayError, ReplaySettings};
 use status::Board;
 pub use status::{ReplayEnding, ReplayPhase, ReplayStatus, ReplayWatch};
@@ -56,7 +56,7 @@ pub struct Replay {
     clock: PathClock,
     law: ContactLaw,
     touch: Touch,
-    last: Joints,
+    on_path: OnPath,
     begun: bool,
     board: Board,
     /// The most that the probe moves off the path (m/s): little after a pause, then e times as much each second.
@@ -77,11 +77,11 @@ impl Replay {
             plan.slowed(ContactSettings { lowest_m: -0.002, highest_m: standoff + offset, ..settings.law });
         let law = ContactLaw::new(law, plan.arm.period)?;
         let (legs, clock) = (plan.legs.clone(), PathClock::new(plan.timing.clone()));
-        let (last, dt) = (plan.start, plan.arm.period.seconds());
+        let (on_path, dt) = (OnPath::new(&plan)?, plan.arm.period.seconds());
         let (stage, touch) = (Stage::Approach { leg: 0 }, Touch::new(settings.lost_after, dt));
         let board = Board::default();
         let (begun, pace) = (false, f64::INFINITY);
-        Ok(Self { plan, settings, operator, stage, legs, clock, law, touch, last, begun, board, pace, dt })
+        Ok(Self { plan, settings, operator, stage, legs, clock, law, touch, on_path, begun, board, pace, dt })
     }
 
     /// The same, slow at first: at the speed of a resume, then e times faster every second. After a stop.
@@ -108,10 +108,12 @@ impl Replay {
     /// Through the air; at the end the descent begins at once.
     fn approach(&mut self, state: &State, leg: usize, pause: bool) -> Option<Joints> {
         let share = if pause { 0.0 } else { self.pace / self.plan.settings.air_speed };
-        match self.legs.get_mut(leg).map(|leg| (leg.step(share, self.dt), *leg.target())) {
-            Some((Some(joints), _)) => Some(joints),
-            Some((None, target)) => {
-                self.last = target;
+        match self.legs.get_mut(leg).map(|leg| leg.step(share, self.dt)) {
+            Some(Some(joints)) => {
+                self.on_path.sent(&joints);
+                Some(joints)
+            }
+            Some(None) => {
                 self.stage = Stage::Approach { leg: leg + 1 };
                 self.approach(state, leg + 1, pause)
             }
@@ -188,7 +190,7 @@ impl Replay {
         let s = self.clock.step(speed, self.dt);
         self.stage = if self.touch.is_lost(force, self.settings.lost_below_n) {
             Stage::Lift { ending: ReplayEnding::ContactLost { at_m: s } }
-        } else if self.clock.has_arrived() {
+        } else if self.clock.has_arrived() && self.on_path.keeps_up() {
             Stage::Lift { ending: ReplayEnding::Completed }
         } else {
             Stage::Follow { cap, yielding }
@@ -225,10 +227,9 @@ impl Replay {
     /// The joints for the place along the path and the offset.
     fn on_path(&mut self) -> Option<Joints> {
         let offset = self.law.offset_m() - self.plan.settings.standoff;
-        let pose = along_z(&self.plan.curve.at(self.clock.at()).base_from_probe, offset);
-        let found = self.plan.arm.joints(&pose, &self.last);
+        let found = self.on_path.step(&self.plan, &mut self.clock, offset, self.dt);
         if found.is_none() {
-            self.finish(ReplayEnding::OutOfReach { at_m: self.clock.at() });
+            self.finish(ReplayEnding::OutOfReach { at_m: self.on_path.place() });
         }
         found
     }
@@ -258,7 +259,9 @@ impl Replay {
             Stage::Done => (ReplayPhase::Done, 0.0),
         };
         let offset = self.law.offset_m() - self.plan.settings.standoff;
-        self.board.write(phase, [self.clock.at(), self.clock.speed(), offset, self.law.force_n(), set_n]);
+        self.board.hold(self.on_path.held_by());
+        self.board
+            .write(phase, [self.on_path.place(), self.clock.speed(), offset, self.law.force_n(), set_n]);
     }
 }
 
@@ -274,7 +277,6 @@ impl Controller for Replay {
         }
         let joints = self.tick(state);
         self.report();
-        self.last = joints?;
         joints.map(Command::Position)
     }
 }

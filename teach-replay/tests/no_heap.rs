@@ -73,7 +73,9 @@ impl Arm for Ideal {
         let height = self.arm.probe(&state.position).origin().vector().z;
         let skin = -(SKIN.0 - height).max(0.0) * SKIN.1;
         let hand = if state.guiding { Vector3::new(3.0, -2.0, 1.0) } else { Vector3::zeros() };
-        state.wrench = Wrench::new(hand + Vector3::new(0.0, 0.0, skin), Vector3::new(0.0, 0.1, 0.0));
+        // A sensor that reads the same to the bit is one that hangs.
+        let torque = 0.1 + 1e-4 * (state.tick % 7) as f64;
+        state.wrench = Wrench::new(hand + Vector3::new(0.0, 0.0, skin), Vector3::new(0.0, torque, 0.0));
         Ok(*state)
     }
 

@@ -25,7 +25,6 @@ pub(crate) struct Leg {
     motion: PointToPoint,
     clock: PathClock,
     pace: f64,
-    target: Joints,
 }
 
 impl Leg {
@@ -45,7 +44,7 @@ impl Leg {
         // Longer than the motion, which comes to rest by itself: the clock must not slow down for its own end.
         let limits = PathLimits::uniform(motion.duration_s() + 2.0, speed)
             .map_err(|why| refuse(Refusal::Timing(why)))?;
-        Ok(Self { motion, clock: PathClock::new(limits), pace, target: *to })
+        Ok(Self { motion, clock: PathClock::new(limits), pace })
     }
 
     /// How long it takes (s), ramps left out.
@@ -60,11 +59,6 @@ impl Leg {
         }
         let time = self.clock.step(self.pace * share.clamp(0.0, 1.0), dt);
         Some(self.motion.at(time))
-    }
-
-    /// Where it leads.
-    pub(crate) const fn target(&self) -> &Joints {
-        &self.target
     }
 }
 

@@ -1,5 +1,6 @@
 //! [`ReplaySettings`]: how the skin is touched and the force held.
 
+use probepath_robot::step::StepError;
 use probepath_robot::{ContactError, ContactSettings};
 use thiserror::Error;
 
@@ -68,6 +69,9 @@ pub enum ReplayError {
     /// The contact's law refuses its settings.
     #[error("{0}")]
     Law(#[from] ContactError),
+    /// The arm's step cannot be made.
+    #[error("{0}")]
+    Step(#[from] StepError),
 }
 
 /// Force errors (N) up to which the speed along the path stays, and from which it is a quarter: where the skin is

@@ -4,6 +4,10 @@ use std::fmt;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 
+use probepath_robot::step::Binding;
+
+use super::joints;
+
 /// The phases of a replay, in order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ReplayPhase {
@@ -102,6 +106,8 @@ pub struct ReplayStatus {
     pub force_n: f64,
     /// The force to hold now (N).
     pub set_n: f64,
+    /// The limit that holds the probe back on its path, if any does.
+    pub held_by: Option<Binding>,
     /// How it ended, once it has.
     pub ending: Option<ReplayEnding>,
 }
@@ -123,6 +129,7 @@ impl ReplayWatch {
 struct Numbers {
     phase: AtomicU8,
     numbers: [AtomicU64; 5],
+    held_by: AtomicU64,
     /// Which ending, and its number; zero is none.
     ending: (AtomicU8, AtomicU64),
 }
@@ -138,6 +145,7 @@ impl Numbers {
             offset_m: number(2),
             force_n: number(3),
             set_n: number(4),
+            held_by: joints::of_number(self.held_by.load(Ordering::Relaxed)),
             ending: self.ending(),
         }
     }
@@ -170,6 +178,10 @@ impl Board {
             cell.store(number.to_bits(), Ordering::Relaxed);
         }
         self.numbers.phase.store(phase as u8, Ordering::Release);
+    }
+
+    pub(super) fn hold(&self, by: Option<Binding>) {
+        self.numbers.held_by.store(joints::to_number(by), Ordering::Relaxed);
     }
 
     pub(super) fn end(&self, ending: ReplayEnding) {

@@ -2,6 +2,7 @@
 
 use std::cell::{Cell, RefCell};
 
+use probepath_robot::motion::follow::Curve;
 use probepath_robot::{Ending, Finished, Guard, GuardLimits, Tick, Wish, run};
 
 use super::plant::{DT, Plant, Skin, Truth, arm, home, path};
