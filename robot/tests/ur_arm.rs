@@ -1,5 +1,11 @@
 //! The UR driver against a small controller of bytes: what it needs, what it refuses, what it notices.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test may stop at the first surprise, its helpers too"
+)]
+
 mod support;
 
 use nalgebra::Vector3;

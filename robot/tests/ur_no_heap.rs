@@ -1,5 +1,11 @@
 //! No exchange with a UR arm touches the heap, once it is connected.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test may stop at the first surprise, its helpers too"
+)]
+
 mod support;
 
 use assert_no_alloc::{AllocDisabler, assert_no_alloc};

@@ -8,6 +8,7 @@
 //! a violation of the safety system or plays another's program: those are a person's, at the pendant.
 
 mod arm;
+mod clock;
 mod connect;
 mod counts;
 pub mod dashboard;

@@ -2,6 +2,11 @@
 //! (The one with physics behind it is the simulated cell's, two floors up.)
 
 #![allow(dead_code, reason = "each test uses a part of it")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::disallowed_methods,
+    reason = "it belongs to tests, which may stop at the first surprise, and a stall takes time"
+)]
 
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};

@@ -1,5 +1,7 @@
 //! [`UrArm`]: a UR e-series arm behind [`Arm`].
 
+mod turn;
+
 use std::time::{Duration, Instant};
 
 use probepath_frames::{Span, Stamp};
@@ -7,21 +9,15 @@ use probepath_frames::{Span, Stamp};
 use super::connect::{Connected, Established, establish, release};
 use super::counts::UrCounts;
 use super::dashboard::Dashboard;
-use super::link::{Link, Order, Received};
+use super::link::Link;
 use super::measured::Measured;
 use super::registers::{command, state};
 use super::settings::TICK;
-use super::{UrError, UrSettings, safety, signs};
+use super::{UrError, UrSettings, clock, safety, signs};
 use crate::{Arm, ArmFault, Command, Joints, State};
 
 /// The sending times of so many sequence numbers are kept: 128 ms of them.
 const KEPT: usize = 64;
-
-/// When nobody asked for longer than this, what came meanwhile is read away first.
-const AWAY: Duration = Duration::from_millis(10);
-
-/// Packages with one and the same echo until the script is taken to be hung. Its own watchdogs are quicker.
-const DEAF: u32 = 50;
 
 /// A UR e-series arm on its wire.
 ///
@@ -66,6 +62,7 @@ pub struct UrArm {
     /// When the last package was read, and when the receive buffer was last seen empty after an absence.
     heard: Instant,
     emptied: Option<Instant>,
+    /// The shortest so far.
     round_trip: Duration,
     same_echo: u32,
     fault: Option<ArmFault>,
@@ -78,7 +75,7 @@ impl UrArm {
     /// When any of it is not as it has to be, in words; nothing moves in that case.
     pub fn connect(host: &str, settings: UrSettings) -> Result<Self, UrError> {
         let Established { link, dashboard, last, sequence, session, report } = establish(host, &settings)?;
-        let now = Instant::now();
+        let now = clock::now();
         let counts = UrCounts { connections: 1, ..UrCounts::default() };
         Ok(Self {
             host: host.to_owned(),
@@ -94,7 +91,7 @@ impl UrArm {
             sent: [now; KEPT],
             heard: now,
             emptied: None,
-            round_trip: Duration::ZERO,
+            round_trip: Duration::MAX,
             same_echo: 0,
             fault: None,
         })
@@ -139,10 +136,11 @@ impl UrArm {
         release(&self.host)?;
         let Established { link, dashboard, last, sequence, session, report } =
             establish(&self.host, &self.settings)?;
-        let now = Instant::now();
+        let now = clock::now();
         (self.link, self.dashboard, self.report, self.last) = (Some(link), dashboard, report, last);
         (self.sequence, self.session) = (sequence, session);
         (self.sent, self.heard, self.emptied, self.same_echo) = ([now; KEPT], now, None, 0);
+        self.round_trip = Duration::MAX;
         // A controller that was switched off begins its clock anew.
         self.first_tick = self.first_tick.min(ticks(last.timestamp_s));
         self.fault = None;
@@ -186,13 +184,13 @@ impl UrArm {
         let resting = self.exchange(&Command::Stay)?;
         let (speed, force_n) = (resting.velocity.largest(), resting.wrench.force.norm());
         let refused = |why| Err(UrError::NotZeroed { why });
-        if !(speed < STILL && self.last.state == state::HOLDING) {
+        if speed.is_nan() || speed >= STILL || self.last.state != state::HOLDING {
             return refused(format!("the arm moves, its fastest joint at {speed:.3} rad/s"));
         }
-        if !(force_n < BIAS_N) {
+        if force_n.is_nan() || force_n >= BIAS_N {
             return refused(format!("it reads {force_n:.1} N, more than a bias: lift the probe off"));
         }
-        let (before, began) = (self.last.zeroed, Instant::now());
+        let (before, began) = (self.last.zeroed, clock::now());
         while self.last.zeroed == before {
             self.turn(command::ZERO, [0.0; 6])?;
             if began.elapsed() > Duration::from_secs(5) {
@@ -204,146 +202,6 @@ impl UrArm {
         }
         self.turn(command::STAY, [0.0; 6])?;
         Ok(())
-    }
-
-    /// One tick, or the fault that lasts.
-    fn turn(&mut self, command: i32, setpoint: [f64; 6]) -> Result<(), ArmFault> {
-        let turned = self.sent_and_received(command, setpoint).and_then(|()| self.judge());
-        if let Err(fault) = &turned {
-            self.fault = Some(fault.clone());
-            self.counts.faults += 1;
-            self.last_word();
-        }
-        turned
-    }
-
-    fn sent_and_received(&mut self, command: i32, setpoint: [f64; 6]) -> Result<(), ArmFault> {
-        let (tick, patience) = (self.tick(), self.settings.patience());
-        let lost = |error: UrError| ArmFault::ConnectionLost { tick, why: error.to_string() };
-        let away = !self.settings.stepped && self.heard.elapsed() > AWAY;
-        let Some(link) = &mut self.link else {
-            return Err(ArmFault::ConnectionLost { tick, why: "it was lost before".into() });
-        };
-        self.emptied = None;
-        if away {
-            self.counts.late += link.drain().map_err(lost)?;
-            self.emptied = Some(Instant::now());
-        }
-        self.sequence = self.sequence.wrapping_add(1).max(1);
-        link.send(&Order { sequence: self.sequence, command, session: self.session, setpoint })
-            .map_err(lost)?;
-        let now = Instant::now();
-        if let Some(slot) = self.sent.get_mut(self.sequence as usize % KEPT) {
-            *slot = now;
-        }
-        let received = link.receive(patience).map_err(lost)?;
-        self.counts.texts = link.texts;
-        self.heard = Instant::now();
-        self.take(&received)
-    }
-
-    /// Counts what came, and what did not.
-    fn take(&mut self, received: &Received) -> Result<(), ArmFault> {
-        let Received { newest, older } = *received;
-        let (tick, seconds) = (self.tick(), newest.timestamp_s);
-        let passed = ticks(seconds) - ticks(self.last.timestamp_s);
-        if !seconds.is_finite() || passed < 0 {
-            let why = format!("its clock went from {} s to {seconds} s", self.last.timestamp_s);
-            return Err(ArmFault::ConnectionLost { tick, why });
-        }
-        if newest.position.iter().chain(&newest.target).any(|q| !q.is_finite()) {
-            let why = format!("it measured joints at {:?} rad", newest.position);
-            return Err(ArmFault::ConnectionLost { tick, why });
-        }
-        let counts = &mut self.counts;
-        counts.packages += older + 1;
-        counts.late += older;
-        // After an absence what is missing was read away, and counted as late.
-        let missing = passed.unsigned_abs().saturating_sub(older + 1);
-        if self.emptied.is_none() {
-            counts.gaps += missing;
-            counts.longest_gap = counts.longest_gap.max(missing);
-        }
-        self.same_echo = if newest.sequence == self.last.sequence { self.same_echo + 1 } else { 0 };
-        self.last = newest;
-        Ok(())
-    }
-
-    /// Whether the arm may go on.
-    fn judge(&self) -> Result<(), ArmFault> {
-        let (tick, last) = (self.tick(), &self.last);
-        if let Some(fault) = safety::fault(last.safety_bits, tick) {
-            return Err(fault);
-        }
-        let stopped = |why| Err(ArmFault::WatchdogStop { tick, why });
-        if last.mode != safety::RUNNING {
-            let why = format!("it is {}", safety::mode_words(last.mode));
-            return Err(ArmFault::SafetyFault { tick, why });
-        }
-        if last.runtime != safety::PLAYING {
-            let runtime = safety::runtime_words(last.runtime);
-            let said = self.link.as_ref().map(Link::said).unwrap_or_default();
-            return stopped(format!("our program on the controller is {runtime} ({said})"));
-        }
-        if last.session != self.session {
-            let why = format!("another host shook hands with our script (session {})", last.session);
-            return Err(ArmFault::ConnectionLost { tick, why });
-        }
-        match last.state {
-            state::TIMED_OUT => stopped(format!(
-                "the script heard nothing for more than {} ms while the arm was not at rest",
-                self.settings.watchdog.nanoseconds() / 1_000_000
-            )),
-            state::REFUSED => {
-                let why =
-                    "the script on the controller found the setpoint too far from where the arm is".into();
-                Err(ArmFault::ProtectiveStop { tick, why })
-            }
-            state::HUNG => stopped("the script's moving thread hung, and was ended".into()),
-            _ if self.same_echo > DEAF => {
-                stopped(format!("the script has not echoed a command for {} packages", self.same_echo))
-            }
-            _ => Ok(()),
-        }
-    }
-
-    /// The last word to an arm that failed: it may hear without being heard. Then the script stops by its watchdog
-    /// at the latest.
-    fn last_word(&mut self) {
-        let (sequence, session) = (self.sequence.wrapping_add(1).max(1), self.session);
-        if let Some(link) = &mut self.link {
-            let _ = link.send(&Order { sequence, command: command::STAY, session, setpoint: [0.0; 6] });
-        }
-        self.sequence = sequence;
-        if matches!(self.fault, Some(ArmFault::ConnectionLost { .. })) {
-            self.link = None;
-        }
-    }
-
-    /// Ticks of the controller since we connected.
-    fn tick(&self) -> u64 {
-        u64::try_from(ticks(self.last.timestamp_s) - self.first_tick).unwrap_or(0)
-    }
-
-    /// How old the newest package is at most: the script had our sequence number before it measured. After an absence
-    /// the echo says little, but the package came after the buffer was empty.
-    fn age(&mut self) -> Span {
-        if self.settings.stepped {
-            return Span::ZERO;
-        }
-        let behind = self.sequence.wrapping_sub(self.last.sequence).clamp(0, KEPT as i32 - 1);
-        let echoed = self.sequence.wrapping_sub(behind) as usize % KEPT;
-        let round = self.sent.get(echoed).map_or(Duration::ZERO, Instant::elapsed);
-        let age = match self.emptied {
-            Some(emptied) => round.min(emptied.elapsed() + self.round_trip),
-            None => {
-                self.round_trip = round;
-                round
-            }
-        };
-        let age = Span::from_nanoseconds(i64::try_from(age.as_nanos()).unwrap_or(i64::MAX));
-        self.counts.oldest = self.counts.oldest.max(age);
-        age
     }
 
     /// The newest package as everybody else knows it.

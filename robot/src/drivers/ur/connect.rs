@@ -1,7 +1,7 @@
 //! How a connection comes about, each step refused in words: the controller's version, its dashboard, the recipes, the
 //! arm's readiness, the model against the controller, our script, the handshake, the payload.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use nalgebra::Vector3;
 
@@ -11,7 +11,7 @@ use super::measured::Measured;
 use super::registers::{PROTOCOL, command, state};
 use super::rtde::ControllerVersion;
 use super::socket::Socket;
-use super::{UrError, UrSettings, safety, signs};
+use super::{UrError, UrSettings, clock, safety, signs};
 use crate::Joints;
 
 /// Scripts are taken here.
@@ -95,7 +95,7 @@ fn supported(found: ControllerVersion) -> Result<ControllerVersion, UrError> {
 
 /// The first package of an arm that may move. Right after an unlocking it may take some packages to show.
 fn ready(link: &mut Link) -> Result<Measured, UrError> {
-    let began = Instant::now();
+    let began = clock::now();
     loop {
         let first = first_package(link)?;
         let why = match safety::fault(first.safety_bits, 0) {
@@ -176,7 +176,7 @@ fn make_room(
         return Err(UrError::OtherProgram);
     }
     dashboard.wants("stop", "stopped")?;
-    let began = Instant::now();
+    let began = clock::now();
     while link.receive(PATIENCE)?.newest.runtime != 1 {
         if began.elapsed() > STEP {
             return Err(UrError::NotReady { why: "the program that runs does not stop".into() });
@@ -209,7 +209,7 @@ const fn order(sequence: i32, command: i32, session: i32) -> Order {
 fn upload(link: &mut Link, host: &str, settings: &UrSettings) -> Result<(), UrError> {
     let mut socket = Socket::open(host, SCRIPTS, "script port", PATIENCE)?;
     socket.write(settings.parameters().text().as_bytes(), "sending our script")?;
-    let began = Instant::now();
+    let began = clock::now();
     loop {
         let measured = link.receive(PATIENCE)?.newest;
         let plays = measured.runtime == safety::PLAYING;
@@ -243,7 +243,7 @@ fn did_not_start(link: &Link, measured: &Measured, waited: Duration) -> UrError 
 
 /// Says hello until the script serves us; the last package, and the sequence number that was sent last.
 fn shake_hands(link: &mut Link, first: i32, session: i32) -> Result<(Measured, i32), UrError> {
-    let (mut sequence, began) = (first, Instant::now());
+    let (mut sequence, began) = (first, clock::now());
     loop {
         link.send(&order(sequence, command::HELLO, session))?;
         let measured = link.receive(PATIENCE)?.newest;
@@ -284,7 +284,7 @@ fn carries(measured: &Measured, settings: &UrSettings) -> Result<(), UrError> {
 /// Unlocks a protective stop on a person's word. What a person has to do at the arm itself is said, not done.
 pub(super) fn release(host: &str) -> Result<(), UrError> {
     let mut dashboard = Dashboard::connect(host)?;
-    let began = Instant::now();
+    let began = clock::now();
     loop {
         let status = dashboard.safety_status()?;
         let why = match status.as_str() {
@@ -301,7 +301,7 @@ pub(super) fn release(host: &str) -> Result<(), UrError> {
         if status != "PROTECTIVE_STOP" || began.elapsed() > UNLOCKED_IN {
             return Err(UrError::NotReady { why });
         }
-        std::thread::sleep(Duration::from_millis(100));
+        clock::wait(Duration::from_millis(100));
     }
     dashboard.wants("close safety popup", "closing safety popup")
 }

@@ -1,10 +1,10 @@
 //! [`Dashboard`]: port 29999, a line for a line.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use super::UrError;
 use super::lines::Lines;
 use super::socket::Socket;
+use super::{UrError, clock};
 
 /// The port.
 pub const PORT: u16 = 29999;
@@ -92,7 +92,7 @@ impl Dashboard {
     }
 
     fn line(&mut self, doing: &'static str) -> Result<String, UrError> {
-        let began = Instant::now();
+        let began = clock::now();
         loop {
             if let Some(line) = self.lines.next()? {
                 return Ok(line.to_owned());

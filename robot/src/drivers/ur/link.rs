@@ -1,6 +1,6 @@
 //! [`Link`]: the RTDE connection, from its first byte to its recipes, and then a package out and a package in.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::measured::{Measured, OUTPUTS, RATE_HZ};
 use super::registers::INPUTS;
@@ -9,7 +9,7 @@ use super::rtde::{
     output_type,
 };
 use super::socket::Socket;
-use super::{UrError, error};
+use super::{UrError, clock, error};
 
 /// How long an answer may take while connecting.
 pub(super) const PATIENCE: Duration = Duration::from_secs(5);
@@ -156,7 +156,7 @@ impl Link {
         doing: &'static str,
         wanted: impl Fn(Reply<'_>) -> Option<T>,
     ) -> Result<T, UrError> {
-        let began = Instant::now();
+        let began = clock::now();
         loop {
             while let Some(frame) = self.decoder.next().map_err(error::rtde(doing))? {
                 match Reply::read(frame, version).map_err(error::rtde(doing))? {
@@ -195,7 +195,7 @@ impl Link {
 
     /// Waits for the next package, and gives the newest of those that have come. No heap.
     pub(super) fn receive(&mut self, patience: Duration) -> Result<Received, UrError> {
-        let (began, doing) = (Instant::now(), "waiting for its next package");
+        let (began, doing) = (clock::now(), "waiting for its next package");
         loop {
             if let Some(received) = self.newest(doing)? {
                 return Ok(received);
@@ -217,7 +217,7 @@ impl Link {
 
     fn drained(&mut self, doing: &'static str) -> Result<u64, UrError> {
         let mut packages = 0;
-        let began = Instant::now();
+        let began = clock::now();
         // As much as a full receive buffer holds, and then it is enough.
         for _ in 0..256 {
             packages += self.newest(doing)?.map_or(0, |received| received.older + 1);
