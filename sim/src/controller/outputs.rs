@@ -123,10 +123,8 @@ impl Register {
 impl Source {
     /// Where the output called `name` comes from; `None` when there is none of that name.
     pub(super) fn of(name: &str) -> Option<Self> {
-        if let Some(rest) = name.strip_prefix("output_") {
-            if let Some(register) = Register::of(rest) {
-                return Some(Self::Output(register));
-            }
+        if let Some(register) = name.strip_prefix("output_").and_then(Register::of) {
+            return Some(Self::Output(register));
         }
         if let Some(rest) = name.strip_prefix("input_") {
             return Register::of(rest).map(Self::Input);

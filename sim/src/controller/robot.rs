@@ -200,14 +200,13 @@ impl Robot {
     fn refused(&self, next: &Joints, dt: f64) -> Option<String> {
         for (joint, limit) in self.arm.model.limits().iter().enumerate() {
             let speed = (next[joint] - self.target.position[joint]).abs() / dt;
-            // Written so that NaN is refused as well.
-            if !(speed <= TOO_FAST * limit.velocity) {
+            if speed.is_nan() || speed > TOO_FAST * limit.velocity {
                 return Some(format!(
                     "joint {joint} would go at {speed:.2} rad/s, at most {:.2}",
                     limit.velocity
                 ));
             }
-            if !(next[joint] >= limit.lower - 1e-9 && next[joint] <= limit.upper + 1e-9) {
+            if !(limit.lower - 1e-9..=limit.upper + 1e-9).contains(&next[joint]) {
                 let (low, high) = (limit.lower, limit.upper);
                 return Some(format!(
                     "joint {joint} would go to {:.4} rad, {low:.4} to {high:.4}",

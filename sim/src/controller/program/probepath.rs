@@ -109,12 +109,11 @@ impl Own {
 
     /// One tick of both threads; why the program ended, when it did.
     pub(in crate::controller) fn tick(&mut self, cycle: &mut Cycle<'_>) -> Option<String> {
-        if !cycle.hung.reader {
-            if let Some(why) = self.read(cycle) {
-                return Some(why);
-            }
+        let ended = if cycle.hung.reader { None } else { self.read(cycle) };
+        if ended.is_some() || cycle.hung.mover {
+            return ended;
         }
-        if cycle.hung.mover { None } else { self.moving(cycle) }
+        self.moving(cycle)
     }
 
     /// The reader's turn.

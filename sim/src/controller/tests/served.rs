@@ -1,5 +1,10 @@
 //! Over sockets, as a client meets it. What is judged is what the client reads, by the controller's clock.
 
+#![allow(
+    clippy::disallowed_methods,
+    reason = "a client in wall time, with deadlines that a loaded machine keeps"
+)]
+
 use std::io::{Read, Write};
 use std::net::{IpAddr, Ipv4Addr, TcpStream};
 use std::time::{Duration, Instant};
