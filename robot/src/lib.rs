@@ -57,6 +57,7 @@ pub mod realtime;
 mod recorded;
 mod run;
 pub mod step;
+mod tool;
 
 pub use arm::{Arm, ArmFault, Command, Controller, Safety, State};
 pub use black_box::BlackBox;
@@ -79,3 +80,4 @@ pub use observer::{Observer, Tick, Wish};
 pub use operator::{Asked, Operator};
 pub use recorded::{RecordedArm, Row};
 pub use run::{Ending, Finished, RunError, StopReason, run};
+pub use tool::{Air, Tool, ToolError, ToolFit, ToolReading, ZeroSettings, ZeroWatch, identify};

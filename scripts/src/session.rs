@@ -17,6 +17,7 @@ mod recorder;
 mod report;
 mod scan;
 mod teach;
+mod true_contact;
 mod truth;
 mod visit;
 
@@ -43,6 +44,7 @@ pub use report::{ReportWish, Segment};
 pub(crate) use scan::SCAN_FIGURES;
 pub use scan::{Lumen, Scan, ScanWish};
 pub use teach::{GuideBy, TeachWish};
+pub use true_contact::TrueContact;
 pub use truth::{CalibrationTruth, StenosisError};
 pub use visit::{CalibrationPlan, PhantomImages, VisitWish, Visits};
 
@@ -178,11 +180,6 @@ impl Session {
     /// How far a calibration is from where the image truly is; only a simulated cell can say.
     pub fn calibration_error(&self, calibrated: &Calibrated) -> Option<CalibrationTruth> {
         Some(truth::calibration_error(self.cell.simulated.as_ref()?, calibrated))
-    }
-
-    /// RMS error of the force that the skin truly felt along the path (N); only a simulated cell can say.
-    pub fn true_force_rms(&self, scan: &Scan) -> Option<f64> {
-        truth::force_rms(self.truth()?, scan)
     }
 
     fn truth(&self) -> Option<&Truth> {

@@ -21,6 +21,7 @@ pub use touch::Touch;
 pub use truth::Truth;
 
 use crate::arm::SimulatedArm;
+use crate::disturbance::DisturbanceConfig;
 use crate::hand::HandConfig;
 use crate::machine::SimulatedMachine;
 use crate::subject::Subject;
@@ -106,6 +107,16 @@ impl SimulatedCell {
     /// The hand that guides.
     pub fn hand(&self) -> SimulatedHand {
         SimulatedHand { scene: self.scene.clone(), usual: self.config.hand.clone() }
+    }
+
+    /// From now on the contact is disturbed like this; the configuration's own disturbance ends.
+    ///
+    /// # Errors
+    /// When a number is impossible.
+    pub fn disturb(&self, disturbance: &DisturbanceConfig) -> Result<(), CellError> {
+        CellConfig { disturbance: disturbance.clone(), ..self.config.clone() }.check()?;
+        self.scene.lock().disturb(disturbance);
+        Ok(())
     }
 
     /// What was truly there: for tests and for `validate`, never for the code under test.

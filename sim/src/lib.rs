@@ -34,6 +34,7 @@
 mod arm;
 mod cell;
 pub mod controller;
+mod disturbance;
 mod hand;
 pub mod igtl;
 mod knobs;
@@ -54,6 +55,7 @@ pub use cell::{
     ArmConfig, ArmKind, CellConfig, CellError, MachineConfig, Moment, Nominal, SimulatedCell, SimulatedHand,
     SubjectConfig, TICK, Touch, Truth, Window,
 };
+pub use disturbance::DisturbanceConfig;
 pub use hand::HandConfig;
 pub use knobs::{ArmKnobs, Interval, Knobs, MachineKnobs, Ticks};
 pub use leg::{Leg, LegConfig, Side};

@@ -143,7 +143,7 @@ impl SimulatedMachine {
             if self.formed_at(number) > scene.now() {
                 break;
             }
-            let pose = scene.world_from_probe(self.formed_at(shows)).filter(|_| self.arrives(number));
+            let pose = scene.leg_from_probe(self.formed_at(shows)).filter(|_| self.arrives(number));
             let contact = pose.and_then(|pose| scene.touched(&pose));
             drop(scene);
             self.next += 1;

@@ -9,6 +9,7 @@ use nalgebra::Vector3;
 use probepath_frames::{Direction, Point, Pose, Probe, Twist, World, Wrench};
 use serde::{Deserialize, Serialize};
 
+use crate::disturbance::Disturbance;
 use crate::random::{Stream, Wander};
 
 /// Half the length of the probe's face, along its x (m).
@@ -138,6 +139,7 @@ impl Skin {
         body: &dyn Surface,
         world_from_probe: &Pose<World, Probe>,
         twist: &Twist<Probe>,
+        disturbance: &Disturbance,
     ) -> Wrench<Probe> {
         let mut total = Wrench::zero();
         if self.distance(body, world_from_probe.origin()).0 > FAR_M {
@@ -146,7 +148,7 @@ impl Skin {
         for along in ALONG {
             for across in ACROSS {
                 let at = Vector3::new(along * HALF_FACE_X_M, across * HALF_FACE_Y_M, 0.0);
-                let force = self.push(body, world_from_probe, twist, at);
+                let force = self.push(body, world_from_probe, (twist, disturbance), at);
                 total = total + Wrench::new(force, at.cross(&force));
             }
         }
@@ -159,12 +161,13 @@ impl Skin {
         &self,
         body: &dyn Surface,
         world_from_probe: &Pose<World, Probe>,
+        disturbance: &Disturbance,
     ) -> Option<(f64, f64)> {
         let step = 2.0 * HALF_FACE_X_M / f64::from(TOUCH_STEPS);
         let at = |i: u32| -HALF_FACE_X_M + step * f64::from(i);
         let gap = |i: u32| {
             let place = *world_from_probe * Point::<Probe>::new(at(i), 0.0, 0.0);
-            self.distance(body, place).0 - self.config.gel_mm * 1e-3
+            self.distance(body, place).0 - disturbance.bump(place.vector().z) - self.config.gel_mm * 1e-3
         };
         let gaps: Vec<f64> = (0..=TOUCH_STEPS).map(gap).collect();
         let touching = |i: &u32| gaps.get(*i as usize).is_some_and(|gap| *gap < 0.0);
@@ -177,11 +180,13 @@ impl Skin {
         &self,
         body: &dyn Surface,
         world_from_probe: &Pose<World, Probe>,
-        twist: &Twist<Probe>,
+        (twist, disturbance): (&Twist<Probe>, &Disturbance),
         at: Vector3<f64>,
     ) -> Vector3<f64> {
         let place = *world_from_probe * Point::<Probe>::from_vector(at);
         let (distance, normal) = self.distance(body, place);
+        let along_m = place.vector().z;
+        let distance = distance - disturbance.bump(along_m);
         if distance >= 0.0 {
             return Vector3::zeros();
         }
@@ -189,9 +194,10 @@ impl Skin {
         let normal = (world_from_probe.inverse() * normal).vector();
         let velocity = twist.linear + twist.angular.cross(&at);
         let approach = -velocity.dot(&normal);
-        let press = self.stiffness(place) * -distance + self.config.pressing_n_s_m * approach;
+        let (stiffer, drier) = disturbance.factors(along_m);
+        let press = stiffer * self.stiffness(place) * -distance + self.config.pressing_n_s_m * approach;
         let pressing = press.max(0.0) * share;
-        normal * pressing + self.drag(velocity + normal * approach, pressing, share)
+        normal * pressing + self.drag(velocity + normal * approach, pressing, share) * drier
     }
 
     /// Friction against sliding with `velocity` (m/s) under a pressing force (N).
@@ -220,6 +226,10 @@ pub(crate) mod tests {
         }
     }
 
+    fn still() -> Disturbance {
+        Disturbance::new(crate::DisturbanceConfig::default(), probepath_frames::Stamp::ZERO)
+    }
+
     /// The probe pointing down, its face `depth` metres into the table.
     pub(crate) fn down(depth: f64) -> Pose<World, Probe> {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -std::f64::consts::FRAC_PI_2);
@@ -230,7 +240,7 @@ pub(crate) mod tests {
     #[test]
     fn pressed_squarely_the_force_is_stiffness_times_depth_and_negative_along_z() {
         let skin = Skin::new(&SkinConfig::even(1.5), 1);
-        let wrench = skin.press(&Table, &down(0.003), &Twist::zero());
+        let wrench = skin.press(&Table, &down(0.003), &Twist::zero(), &still());
         assert!((wrench.force - Vector3::new(0.0, 0.0, -4.5)).norm() < 1e-9, "{}", wrench.force);
         assert!(wrench.torque.norm() < 1e-9);
     }
@@ -238,20 +248,20 @@ pub(crate) mod tests {
     #[test]
     fn in_the_air_nothing_pushes() {
         let skin = Skin::new(&SkinConfig::even(1.5), 1);
-        assert_eq!(skin.press(&Table, &down(-0.0001), &Twist::zero()), Wrench::zero());
+        assert_eq!(skin.press(&Table, &down(-0.0001), &Twist::zero(), &still()), Wrench::zero());
     }
 
     #[test]
     fn what_touches_is_found_along_the_face() {
         let skin = Skin::new(&SkinConfig::even(1.5), 1);
-        assert_eq!(skin.touched(&Table, &down(-0.0016)), None);
-        let (from, to) = skin.touched(&Table, &down(0.001)).unwrap();
+        assert_eq!(skin.touched(&Table, &down(-0.0016), &still()), None);
+        let (from, to) = skin.touched(&Table, &down(0.001), &still()).unwrap();
         assert!(from < -0.02 && to > 0.02);
         let tilt = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 0.2);
         // FRAMES: the same probe, turned about its own y: positive x goes out of the table's tissue.
         let tilted =
             down(0.0) * Pose::<Probe, Probe>::assume(Isometry3::from_parts(Vector3::zeros().into(), tilt));
-        let (from, to) = skin.touched(&Table, &tilted).unwrap();
+        let (from, to) = skin.touched(&Table, &tilted, &still()).unwrap();
         // The face stands 1.5 mm over the tissue at 1.5 mm / sin(0.2) = 7.55 mm.
         assert!(
             (from + 0.00755).abs() < 0.001 && to > 0.02 || from < -0.02 && (to - 0.00755).abs() < 0.001,
@@ -266,7 +276,7 @@ pub(crate) mod tests {
         // FRAMES: the same probe, turned about its own y.
         let tilted =
             down(0.003) * Pose::<Probe, Probe>::assume(Isometry3::from_parts(Vector3::zeros().into(), tilt));
-        let wrench = skin.press(&Table, &tilted, &Twist::zero());
+        let wrench = skin.press(&Table, &tilted, &Twist::zero(), &still());
         assert!(wrench.torque.y < -1e-4, "{}", wrench.torque);
     }
 
@@ -275,7 +285,7 @@ pub(crate) mod tests {
         let config = SkinConfig { friction: 0.1, sliding_n_s_m: 5.0, ..SkinConfig::even(1.0) };
         let skin = Skin::new(&config, 1);
         let slide = Twist::new(Vector3::new(0.0, 0.02, 0.0), Vector3::zeros());
-        let wrench = skin.press(&Table, &down(0.004), &slide);
+        let wrench = skin.press(&Table, &down(0.004), &slide, &still());
         assert!((wrench.force.y + 0.1 * 4.0 + 5.0 * 0.02).abs() < 1e-6, "{}", wrench.force);
         assert!(wrench.force.x.abs() < 1e-12);
     }

@@ -5,8 +5,8 @@ use probepath_recon::{Fit, LumenReconstruction, Mesh, compare};
 use probepath_sim::{SimulatedCell, Truth, Vessel};
 use serde::Serialize;
 
+use super::Calibrated;
 use super::calibrate::apart;
-use super::{Calibrated, Scan};
 use crate::report::SurfaceError;
 
 /// How much true surface lies beyond the reconstructed one at both ends (m), so that no end is compared with an edge.
@@ -83,19 +83,6 @@ fn found_near(vessel: &Vessel, at_m: f64, recon: &LumenReconstruction) -> Option
         .filter(|(away, _)| *away < 0.010)
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, percent)| percent)
-}
-
-/// RMS error of the true pressing force while the path was followed (N).
-pub(super) fn force_rms(truth: &Truth, scan: &Scan) -> Option<f64> {
-    let (from, until) = scan.followed?;
-    let set = scan.wish.force_n;
-    let squares: Vec<f64> = truth
-        .moments()
-        .iter()
-        .filter(|moment| (from..=until).contains(&moment.stamp))
-        .map(|moment| (-moment.skin.force.z - set).powi(2))
-        .collect();
-    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
 }
 
 /// How far a calibration is from the truth.

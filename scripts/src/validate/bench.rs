@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use probepath_robot::Operator;
+use probepath_teach_replay::Path as Taught;
 
 use super::ValidateError;
 use crate::progress::Progress;
@@ -24,20 +25,26 @@ pub(super) fn taught_and_scanned(
     out: &Path,
 ) -> Result<Bench, ValidateError> {
     let wrong = |source: SessionError| ValidateError::Session { seed, source };
-    let mut session = Session::open(Opening {
-        cell: cell.clone(),
-        seed,
-        out: out.to_owned(),
-        protocol: Protocol { name: "validate".into(), text: String::new() },
-        date: None,
-        operator: Operator::new(),
-        progress: Arc::new(()),
-    })
-    .map_err(wrong)?;
-    let path =
-        session.teach(&TeachWish { study: "VALIDATE".into(), ..TeachWish::default() }).map_err(wrong)?;
+    let (mut session, path) = taught(cell, seed, out, (Operator::new(), Arc::new(())))?;
     let scan = session.scan(&path, wish).map_err(wrong)?;
     Ok(Bench { session, scan })
+}
+
+/// Teaches one seed in a folder of its own; with an operator, and who hears of the progress.
+pub(super) fn taught(
+    cell: &CellFile,
+    seed: u64,
+    out: &Path,
+    (operator, progress): (Operator, Arc<dyn Progress>),
+) -> Result<(Session, Taught), ValidateError> {
+    let wrong = |source: SessionError| ValidateError::Session { seed, source };
+    let protocol = Protocol { name: "validate".into(), text: String::new() };
+    let (cell, out) = (cell.clone(), out.to_owned());
+    let mut session = Session::open(Opening { cell, seed, out, protocol, date: None, operator, progress })
+        .map_err(wrong)?;
+    let path =
+        session.teach(&TeachWish { study: "VALIDATE".into(), ..TeachWish::default() }).map_err(wrong)?;
+    Ok((session, path))
 }
 
 /// A folder for the exams of a validation, gone when it is done.

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::CellError;
 use crate::arm::{KinematicError, SensorConfig, ToolConfig};
+use crate::disturbance::DisturbanceConfig;
 use crate::hand::HandConfig;
 use crate::knobs::Knobs;
 use crate::leg::LegConfig;
@@ -28,6 +29,8 @@ pub struct CellConfig {
     pub machine: MachineConfig,
     /// The hand that guides.
     pub hand: HandConfig,
+    /// What disturbs the contact.
+    pub disturbance: DisturbanceConfig,
     /// What fails.
     pub knobs: Knobs,
 }
@@ -218,6 +221,9 @@ impl CellConfig {
         within("hand.speed_mm_s", hand.speed_mm_s, 1.0, 250.0)?;
         within("hand.press_n", hand.press_n, 0.5, 30.0)?;
         within("hand.unsteadiness", hand.unsteadiness, 0.0, 10.0)?;
+        for (field, value, low, high) in self.disturbance.numbers() {
+            within(field, value, low, high)?;
+        }
         machine.check()?;
         if let SubjectConfig::WirePhantom(wires) = &self.subject {
             tank::refuse(wires, within)?;

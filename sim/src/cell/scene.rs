@@ -3,7 +3,7 @@
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use nalgebra::Vector6;
+use nalgebra::{Vector3, Vector6};
 use probepath_frames::{Pose, Probe, Stamp, Twist, World, Wrench};
 use probepath_robot::{JointLimit, Joints, Model};
 
@@ -14,6 +14,7 @@ use crate::arm::error::{Blueprint, TrueChain};
 use crate::arm::give_way;
 use crate::arm::sensor::Sensor;
 use crate::arm::servo::Servo;
+use crate::disturbance::{Disturbance, DisturbanceConfig};
 use crate::hand::{Course, Hand, HandConfig};
 use crate::random::Stream;
 use crate::skin::Skin;
@@ -71,6 +72,7 @@ pub(crate) struct Scene {
     sensor: Sensor,
     encoder: Stream,
     hand: Option<Hand>,
+    disturbance: Disturbance,
     seed: u64,
     guided: u64,
     connections: u64,
@@ -104,6 +106,7 @@ impl Scene {
             sensor: Sensor::new(&config.sensor, TICK.seconds(), seed),
             encoder: Stream::new(seed, "encoder"),
             hand: None,
+            disturbance: Disturbance::new(config.disturbance.clone(), Stamp::ZERO),
             seed,
             guided: 0,
             connections: 0,
@@ -127,13 +130,37 @@ impl Scene {
         let step = last.world_from_probe.twist_to(&world_from_probe);
         let per_s = 1.0 / TICK.seconds();
         let twist = Twist::new(step.linear * per_s, step.angular * per_s);
-        let skin = self.skin.press(&*self.subject, &world_from_probe, &twist);
+        let now = last.stamp + TICK;
+        let skin = self.pressed(&world_from_probe, &twist, now);
         let felt = skin.force.norm();
         let grip = self.hand.as_mut().map(|hand| hand.step(&world_from_probe, &twist, felt, TICK.seconds()));
         let (hand, guiding) = grip.map_or((Wrench::zero(), false), |grip| (grip.wrench, grip.guiding));
-        let stamp = last.stamp + TICK;
-        self.moments.push(Moment { stamp, joints, world_from_probe, skin, hand, guiding });
+        self.moments.push(Moment { stamp: now, joints, world_from_probe, skin, hand, guiding });
         self.moved.notify_all();
+    }
+
+    /// What the skin does to the probe, wherever the leg has moved.
+    fn pressed(
+        &self,
+        world_from_probe: &Pose<World, Probe>,
+        twist: &Twist<Probe>,
+        now: Stamp,
+    ) -> Wrench<Probe> {
+        let moving = world_from_probe.isometry().rotation.inverse() * self.disturbance.velocity(now);
+        let twist = Twist::new(twist.linear - moving, twist.angular);
+        let on_leg = self.disturbance.on_leg(world_from_probe, now);
+        self.skin.press(&*self.subject, &on_leg, &twist, &self.disturbance)
+    }
+
+    /// From now on the contact is disturbed like this.
+    pub(crate) fn disturb(&mut self, config: &DisturbanceConfig) {
+        self.disturbance = Disturbance::new(config.clone(), self.now());
+    }
+
+    /// The probe as the leg had it at an instant: what the picture shows, and what gel joins. Where the probe was, but
+    /// for the leg's own motion.
+    pub(crate) fn leg_from_probe(&self, at: Stamp) -> Option<Pose<World, Probe>> {
+        Some(self.disturbance.on_leg(&self.world_from_probe(at)?, at))
     }
 
     /// Where the motors' positions truly bring the probe.
@@ -284,7 +311,8 @@ impl Scene {
     /// What the force sensor reads, `elapsed_s` after its bias was taken off.
     pub(crate) fn sensed(&mut self, elapsed_s: f64) -> Wrench<Probe> {
         let truth = self.last().skin + self.last().hand;
-        self.sensor.read(truth, elapsed_s)
+        let drift = Vector3::new(0.0, 0.0, self.disturbance.drift_n(self.now()));
+        self.sensor.read(truth + Wrench::new(drift, Vector3::zeros()), elapsed_s)
     }
 
     /// Where the probe truly was between two ticks; `None` before the beginning and after now.
@@ -318,6 +346,6 @@ impl Scene {
         if let Some(tank) = self.subject.tank() {
             return tank.wet(world_from_probe);
         }
-        self.skin.touched(&*self.subject, world_from_probe)
+        self.skin.touched(&*self.subject, world_from_probe, &self.disturbance)
     }
 }
