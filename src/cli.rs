@@ -171,6 +171,9 @@ pub struct Validate {
     /// How many seeds.
     #[arg(long, default_value_t = 10)]
     pub seeds: u64,
+    /// How long the soak is.
+    #[arg(long, default_value_t = 10.0)]
+    pub minutes: f64,
     /// Only this setting of the table ("zoom 3:7").
     #[arg(long, value_name = "NAME")]
     pub setting: Option<String>,
@@ -185,6 +188,8 @@ pub enum Goal {
     Table2,
     /// The contact force along the leg.
     Force,
+    /// Minutes of replay on the wire beside image capture and recording: what was lost, how punctual it was.
+    Soak,
     /// Every commanded motion within the limits, read back from the exam; the path's error.
     Motion,
 }

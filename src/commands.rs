@@ -68,6 +68,7 @@ fn validated(args: &crate::cli::Validate, screen: &Screen) -> Outcome {
         Goal::Table1 => Document::of(&validate::table1(seeds, args.setting.as_deref(), &*progress)?),
         Goal::Table2 => Document::of(&validate::table2(seeds, args.setting.as_deref(), &*progress)?),
         Goal::Force => Document::of(&validate::force(seeds, &*progress)?),
+        Goal::Soak => Document::of(&validate::soak(&validate::SoakWish::wall(args.minutes), &*progress)?),
         Goal::Motion => Document::of(&validate::motion(seeds, &*progress)?),
     }?)
 }

@@ -5,6 +5,7 @@
 mod bench;
 mod force;
 mod motion;
+mod soak;
 mod table1;
 mod table2;
 
@@ -15,6 +16,7 @@ use thiserror::Error;
 
 pub use force::force;
 pub use motion::{Shares, motion, shares};
+pub use soak::{SoakWish, soak};
 pub use table1::table1;
 pub use table2::table2;
 
@@ -79,6 +81,12 @@ pub enum ValidateError {
         seed: u64,
         /// Why.
         source: probepath_us_capture::exam::ExamError,
+    },
+    /// The simulated cell cannot be served on its wire.
+    #[error("cannot serve the simulated cell: {why}")]
+    Served {
+        /// Why.
+        why: String,
     },
     /// No such setting.
     #[error("no setting is called \"{asked}\"; there are {names}")]

@@ -1,0 +1,296 @@
+//! The soak: minutes of replay on the wire beside image capture and recording, and what was lost.
+//!
+//! The simulated cell is served on loopback; on the other end is the session as it drives hardware: driver, control
+//! thread, capture and exam file. What was lost is judged by the senders' own numbers, read back from the exam.
+
+use std::net::{IpAddr, Ipv4Addr};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use probepath_frames::{Span, Stamp};
+use probepath_robot::Operator;
+use probepath_robot::realtime::{Clock, Figures, Histogram, Monotonic, TimingFigures, be_realtime};
+use probepath_sim::controller::{ControllerConfig, ControllerServer, Counters, Time};
+use probepath_sim::igtl::{MachineServer, MachineServerConfig, Sent};
+use probepath_sim::{CellConfig, Moment, SimulatedCell};
+use probepath_us_capture::Counts;
+use probepath_us_capture::exam::{Ending, ExamEvent, ExamReader, Level, Written};
+use serde::Deserialize;
+
+use super::bench::{Folder, tell};
+use super::{Goal, Goals, ValidateError};
+use crate::progress::Progress;
+use crate::protocol::Protocol;
+use crate::session::{
+    CellFile, ControllerTime, Opening, PUNCTUAL, ScanWish, Session, SessionError, TeachWish,
+};
+
+/// What is soaked.
+#[derive(Clone, Debug)]
+pub struct SoakWish {
+    /// For at least so long by the cell's clock (s), whole scans.
+    pub seconds: f64,
+    /// The wall's time, or simulated.
+    pub time: Time,
+    /// Where the simulated cell is served.
+    pub host: IpAddr,
+    /// The cell.
+    pub cell: CellConfig,
+}
+
+impl SoakWish {
+    /// In the wall's time, on an address of this process's own.
+    pub fn wall(minutes: f64) -> Self {
+        let process = std::process::id();
+        let part = |n: u32| u8::try_from(n % 250 + 1).unwrap_or(1);
+        let host = IpAddr::V4(Ipv4Addr::new(127, 21, part(process / 250), part(process)));
+        Self { seconds: minutes * 60.0, time: Time::Wall, host, cell: CellConfig::default() }
+    }
+}
+
+/// The seed of the cell: one is enough, nothing here is an average over legs.
+const SEED: u64 = 1;
+
+/// Teaches once, then replays for as long as is wished.
+///
+/// # Errors
+/// When the cell cannot be served, a session fails, or the exam cannot be read back.
+pub fn soak(wish: &SoakWish, progress: &dyn Progress) -> Result<Goals, ValidateError> {
+    let served = |why: String| ValidateError::Served { why };
+    let cell = SimulatedCell::new(&wish.cell, SEED).map_err(|e| served(e.to_string()))?;
+    let (host, time) = (wish.host, wish.time);
+    let config = ControllerConfig { host, time, ..ControllerConfig::default() };
+    let controller = ControllerServer::start(cell.clone(), config).map_err(|e| served(e.to_string()))?;
+    let config = MachineServerConfig { host, time, ..MachineServerConfig::default() };
+    let machine = MachineServer::start(&cell, config).map_err(|e| served(e.to_string()))?;
+    let folder = Folder::new("soak")?;
+    let enough = AtomicBool::new(false);
+    let (ran, bare) = std::thread::scope(|scope| {
+        let bare = (time == Time::Wall).then(|| scope.spawn(|| bare_sleep(&enough)));
+        let ran = run(wish, &cell, folder.path(), progress);
+        enough.store(true, Ordering::Relaxed);
+        (ran, bare.and_then(|bare| bare.join().ok()))
+    });
+    let ran = ran.map_err(|source| ValidateError::Session { seed: SEED, source })?;
+    let found = Found::of(&ran.exam).map_err(|source| ValidateError::Exam { seed: SEED, source })?;
+    let rows = rows(&ran, &found, &controller.counters(), &machine.sent(), bare.as_ref());
+    let what = format!("soak: {:.0} s of replay on the wire beside image capture and recording", ran.seconds);
+    Ok(Goals::new(&what, 1, rows))
+}
+
+/// What the session did.
+struct Ran {
+    exam: std::path::PathBuf,
+    written: Written,
+    seconds: f64,
+    counts: Vec<Counts>,
+    kept: usize,
+    /// What the process held after the first scan and after the last (bytes), and what of it the simulated world's
+    /// memory of the truth may be.
+    memory: Option<(u64, u64)>,
+    truth: u64,
+}
+
+fn run(
+    wish: &SoakWish,
+    cell: &SimulatedCell,
+    out: &Path,
+    progress: &dyn Progress,
+) -> Result<Ran, SessionError> {
+    let time = if wish.time == Time::Wall { ControllerTime::Wall } else { ControllerTime::Simulated };
+    let mut session = Session::open(Opening {
+        cell: CellFile::of_served("soak", cell, wish.host, time),
+        seed: SEED,
+        out: out.to_owned(),
+        protocol: Protocol { name: "soak".into(), text: String::new() },
+        date: None,
+        operator: Operator::new(),
+        progress: Arc::new(()),
+    })?;
+    let path = session.teach(&TeachWish { study: "SOAK".into(), ..TeachWish::default() })?;
+    let scan = ScanWish { every_m: Some(KEPT_EVERY_M), ..ScanWish::default() };
+    let (began, mut counts, mut kept) = (cell.now(), Vec::new(), 0);
+    let (mut before, mut then) = (None, began);
+    while (cell.now() - began).seconds() < wish.seconds {
+        tell(progress, "soak", (cell.now() - began).seconds() as u64, wish.seconds.ceil() as u64);
+        let scanned = session.scan(&path, &scan)?;
+        counts.push(scanned.counts);
+        kept += scanned.images.len();
+        if before.is_none() {
+            (before, then) = (memory(), cell.now());
+        }
+    }
+    let now = cell.now();
+    let truth = (now - then).nanoseconds() / probepath_sim::TICK.nanoseconds();
+    let memory = before.zip(memory());
+    let written = session.close()?.unwrap_or_default();
+    Ok(Ran {
+        exam: session.exam_path(),
+        written,
+        seconds: (now - began).seconds(),
+        counts,
+        kept,
+        memory,
+        truth: u64::try_from(truth).unwrap_or(0) * size_of::<Moment>() as u64,
+    })
+}
+
+/// A B-scan is kept every 2 mm: ten minutes are then less than a gigabyte. Every one is taken and counted all the same.
+const KEPT_EVERY_M: f64 = 0.002;
+
+/// What the exam holds, read as anybody reads it.
+#[derive(Default)]
+struct Found {
+    ticks: u64,
+    bscans: u64,
+    /// Ticks of the arm that are missing between two that are there, while a motion ran.
+    missing: u64,
+    /// What the recording says went wrong, and what is damaged.
+    complaints: u64,
+    punctual: Option<Punctual>,
+}
+
+/// The part of the session's own figures that is judged here.
+#[derive(Deserialize)]
+struct Punctual {
+    unseen_ticks: u64,
+    figures: TimingFigures,
+}
+
+impl Found {
+    fn of(exam: &Path) -> Result<Self, probepath_us_capture::exam::ExamError> {
+        let mut reader = ExamReader::open(exam)?;
+        let (mut found, mut last) = (Self::default(), None);
+        while let Some(event) = reader.next_event()? {
+            match event {
+                ExamEvent::Tick(tick) => {
+                    found.ticks += 1;
+                    found.missing +=
+                        gap(last.replace((tick.tick, tick.phase.clone())), tick.tick, &tick.phase);
+                }
+                ExamEvent::BScan(_) => found.bscans += 1,
+                ExamEvent::Event(event) => found.complaints += u64::from(event.level == Level::Error),
+                ExamEvent::Damaged { .. } => found.complaints += 1,
+                ExamEvent::Attachment(file) if file.name == PUNCTUAL => {
+                    found.punctual = serde_json::from_slice(&file.bytes).ok();
+                }
+                _ => {}
+            }
+        }
+        found.complaints += u64::from(reader.ending() != Some(&Ending::Complete));
+        Ok(found)
+    }
+}
+
+/// Ticks missing between two of the same phase of a motion; between motions nobody listens to the arm.
+fn gap(last: Option<(u64, std::borrow::Cow<'_, str>)>, tick: u64, phase: &str) -> u64 {
+    match last {
+        Some((before, same)) if same == phase && phase != "plan" => {
+            tick.saturating_sub(before).saturating_sub(1)
+        }
+        _ => 0,
+    }
+}
+
+fn rows(ran: &Ran, found: &Found, arm: &Counters, machine: &Sent, bare: Option<&Histogram>) -> Vec<Goal> {
+    let none = |figure: &str, count: u64| Goal::of(figure, &[count as f64], Some(0.0), None);
+    let told = |figure: &str, value: f64| Goal::of(figure, &[value], None, None);
+    let of = |count: fn(&Counts) -> u64| ran.counts.iter().map(count).sum::<u64>();
+    let differ = ran.written.ticks.abs_diff(found.ticks) + ran.written.bscans.abs_diff(found.bscans);
+    let mut rows = vec![
+        none("ticks missing in the exam while a motion ran", found.missing),
+        none("B-scans lost, by the machine's own numbers", of(|c| c.lost + c.out_of_order)),
+        none("B-scans kept and not in the exam", found.bscans.abs_diff(ran.kept as u64)),
+        none("records written and not read back", differ),
+        none("complaints of the recording, damaged records", found.complaints),
+        told("ticks in the exam", found.ticks as f64),
+        told("B-scans that arrived while it was looked", of(|c| c.arrived) as f64),
+        told("B-scans in the exam", found.bscans as f64),
+        told("scans", ran.counts.len() as f64),
+        told("sent: ticks of the controller", arm.ticks as f64),
+        told("sent: packages that it skipped", arm.skipped as f64),
+        told("sent: slips of its clock against the wall", arm.slips as f64),
+        told("sent: B-scans", machine.pictures as f64),
+        told("sent: B-scans too old to be", machine.stale as f64),
+    ];
+    if let Some(punctual) = &found.punctual {
+        rows.push(none("ticks that nobody watched", punctual.unseen_ticks));
+        rows.push(none("ticks skipped, by the arm's count", punctual.figures.skipped));
+        rows.extend(timing(&punctual.figures, bare.and_then(Histogram::figures).as_ref()));
+    }
+    if let Some((before, after)) = ran.memory {
+        let grown = after as f64 - before as f64;
+        rows.push(told("memory grown since the first scan, MB", grown / 1e6));
+        rows.push(told("of it at most the simulation's own truth, MB", ran.truth as f64 / 1e6));
+    }
+    rows
+}
+
+/// The figures of punctuality, and the lateness over that of a loop that only sleeps.
+fn timing(figures: &TimingFigures, bare: Option<&Figures>) -> Vec<Goal> {
+    let named =
+        [("tick lateness", figures.lateness), ("step", figures.step), ("round trip", figures.round_trip)];
+    let each = |f: &Figures| [("p50", f.p50_us), ("p99", f.p99_us), ("p99.9", f.p99_9_us), ("max", f.max_us)];
+    let told = |figure: String, value: f64| Goal::of(figure, &[value], None, None);
+    let mut rows = Vec::new();
+    for (name, found) in named.into_iter().chain([("a bare sleep's lateness", bare.copied())]) {
+        let Some(found) = found else { continue };
+        rows.extend(each(&found).map(|(which, us)| told(format!("{name}, {which}, us"), us)));
+    }
+    if let Some((ours, bare)) = figures.lateness.as_ref().zip(bare) {
+        let pairs = each(ours).into_iter().zip(each(bare));
+        rows.extend(pairs.map(|((which, ours), (_, bare))| {
+            told(format!("tick lateness over the bare sleep's, {which}"), ours / bare)
+        }));
+    }
+    rows
+}
+
+/// How late a thread wakes that only sleeps from tick to tick and asks for what a control thread asks for.
+#[expect(clippy::disallowed_methods, reason = "sleeping is what is measured")]
+fn bare_sleep(enough: &AtomicBool) -> Histogram {
+    let _ = be_realtime();
+    let period = probepath_sim::TICK;
+    let clock = Monotonic::new();
+    let (mut lateness, mut next) = (Histogram::default(), clock.now());
+    while !enough.load(Ordering::Relaxed) {
+        next = next + period;
+        let left = (next - clock.now()).nanoseconds();
+        std::thread::sleep(Duration::from_nanos(u64::try_from(left).unwrap_or(0)));
+        let late: Span = clock.now() - next;
+        lateness.record(late);
+        // Later than a tick: the next counts from now, as it does for whoever is paced from outside.
+        if late > period {
+            next = Stamp::from_nanoseconds((next + late).nanoseconds());
+        }
+    }
+    lateness
+}
+
+/// What this process holds in memory (bytes), where the system says it.
+fn memory() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
+    line.split_whitespace().next()?.parse::<u64>().ok().map(|kilobytes| kilobytes * 1024)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gap_counts_within_a_motion_only() {
+        let last = |tick, phase: &'static str| Some((tick, std::borrow::Cow::Borrowed(phase)));
+        assert_eq!(gap(last(7, "follow"), 8, "follow"), 0);
+        assert_eq!(gap(last(7, "follow"), 11, "follow"), 3);
+        assert_eq!(gap(last(7, "lift"), 900, "approach"), 0);
+        assert_eq!(gap(None, 900, "approach"), 0);
+    }
+
+    #[test]
+    fn this_process_holds_memory() {
+        assert!(!cfg!(target_os = "linux") || memory().is_some_and(|bytes| bytes > 100_000));
+    }
+}
