@@ -109,9 +109,13 @@ pub fn simulate(request: &SimulateRequest) -> Result<Simulating, SimulateError> 
         write_cell(&file.name, &cell, request, path)?;
     }
     let host = request.host;
+    // A cell may be served for days.
+    let remembers_s = Some(REMEMBERS_S);
     let machine = MachineServer::start(&cell, MachineServerConfig { host, time, ..Default::default() })?;
-    let running =
-        ControllerServer::start(cell, ControllerConfig { host, time, ..ControllerConfig::default() })?;
+    let running = ControllerServer::start(
+        cell,
+        ControllerConfig { host, time, remembers_s, ..ControllerConfig::default() },
+    )?;
     let ports = PORTS.map(|(port, what)| Served { port, what }).to_vec();
     Ok(Simulating { cell: file.name, seed: request.seed, host, time, ports, arm, running, machine })
 }
@@ -127,6 +131,9 @@ fn write_cell(
     let text = CellFile::of_served(&format!("{name} on its wire"), cell, request.host, time).text()?;
     std::fs::write(path, text).map_err(|source| SimulateError::Write { path: path.into(), source })
 }
+
+/// How much of what truly was is kept (s).
+const REMEMBERS_S: f64 = 120.0;
 
 const PORTS: [(u16, &str); 6] = [
     (Ports::RTDE, "RTDE: real-time data, 500 Hz"),
