@@ -1,6 +1,7 @@
 //! How long one whole step takes, from the state that came in to the command that goes out: the operator, the contact's
 //! law, the path, kinematics and the quadratic program, the limits and the guard, in the one loop that also runs
-//! hardware. Every single step is timed: `cargo bench -p probepath-teach-replay --bench step`.
+//! hardware. Every single step is timed, and beside all of them those during which the system gave the processor to
+//! nobody else, as on a shared machine the others tell of its other work: `cargo bench -p probepath-teach-replay --bench step`.
 
 #![allow(
     clippy::unwrap_used,
@@ -12,6 +13,7 @@
 use std::time::Instant;
 
 use nalgebra::{Isometry3, Vector3};
+use nix::sys::resource::{UsageWho, getrusage};
 use probepath_frames::{Base, Direction, Point, Pose, Probe, Span, Stamp, Wrench};
 use probepath_robot::{
     Arm, ArmFault, Command, Guard, GuardLimits, Joints, Model, MotionLimits, Operator, Plane, State,
@@ -26,20 +28,30 @@ const PERIOD: Span = Span::from_milliseconds(2);
 /// Height of the skin (m) and its stiffness (N/m).
 const SKIN: (f64, f64) = (0.12, 800.0);
 
+/// Nanoseconds that a step took, and whether it was interrupted.
+type Step = (u64, bool);
+
+/// How often the system took the processor away from this thread.
+fn interruptions() -> i64 {
+    let usage = getrusage(UsageWho::RUSAGE_THREAD).unwrap();
+    usage.involuntary_context_switches() + usage.voluntary_context_switches()
+}
+
 /// An arm that does what it is told at once, on a flat skin, and times what happens between two exchanges.
 struct Timed {
     arm: ProbeArm,
     state: State,
     watch: ReplayWatch,
-    left: Option<Instant>,
-    /// Nanoseconds of every step along the path, and of every other.
-    follow: Vec<u64>,
-    others: Vec<u64>,
+    left: Option<(Instant, i64)>,
+    /// Every step along the path, and every other.
+    follow: Vec<Step>,
+    others: Vec<Step>,
 }
 
 impl Arm for Timed {
     fn exchange(&mut self, command: &Command) -> Result<State, ArmFault> {
-        let took = self.left.map(|left| left.elapsed().as_nanos() as u64);
+        let took =
+            self.left.map(|(left, before)| (left.elapsed().as_nanos() as u64, interruptions() != before));
         let phase = self.watch.status().phase;
         if let Some(took) = took {
             if phase == ReplayPhase::Follow { self.follow.push(took) } else { self.others.push(took) }
@@ -57,7 +69,8 @@ impl Arm for Timed {
         let torque = 1e-4 * (state.tick % 7) as f64;
         state.wrench = Wrench::new(Vector3::new(0.0, 0.0, press), Vector3::new(0.0, torque, 0.0));
         let state = *state;
-        self.left = Some(Instant::now());
+        let before = interruptions();
+        self.left = Some((Instant::now(), before));
         Ok(state)
     }
 
@@ -126,12 +139,15 @@ fn measure(name: &str, model: Model, home: &[f64]) {
         assert_eq!(replay.status().ending, Some(ReplayEnding::Completed));
         (follow, others) = (timed.follow, timed.others);
     }
-    report(&format!("{name}, along the path"), &mut follow);
-    report(&format!("{name}, other phases"), &mut others);
+    for (phase, steps) in [("along the path", &follow), ("other phases", &others)] {
+        report(&format!("{name}, {phase}"), steps.iter().map(|step| step.0).collect());
+        let alone = steps.iter().filter(|step| !step.1).map(|step| step.0).collect();
+        report(&format!("{name}, {phase}, not interrupted"), alone);
+    }
 }
 
 /// Percentiles in microseconds.
-fn report(name: &str, took: &mut [u64]) {
+fn report(name: &str, mut took: Vec<u64>) {
     took.sort_unstable();
     let at = |part: f64| took[((took.len() - 1) as f64 * part) as usize] as f64 * 1e-3;
     println!(
@@ -148,8 +164,8 @@ fn report(name: &str, took: &mut [u64]) {
 
 /// What timing itself takes: two readings of the clock.
 fn clock() {
-    let mut took: Vec<u64> = (0..100_000).map(|_| Instant::now().elapsed().as_nanos() as u64).collect();
-    report("the clock alone", &mut took);
+    let took = (0..100_000).map(|_| Instant::now().elapsed().as_nanos() as u64).collect();
+    report("the clock alone", took);
 }
 
 fn main() {
