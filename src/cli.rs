@@ -192,4 +192,6 @@ pub enum Goal {
     Soak,
     /// Every commanded motion within the limits, read back from the exam; the path's error.
     Motion,
+    /// Every way of losing the process, the link, the operator or a sensor ends with the arm at rest.
+    Safety,
 }

@@ -70,5 +70,6 @@ fn validated(args: &crate::cli::Validate, screen: &Screen) -> Outcome {
         Goal::Force => Document::of(&validate::force(seeds, &*progress)?),
         Goal::Soak => Document::of(&validate::soak(&validate::SoakWish::wall(args.minutes), &*progress)?),
         Goal::Motion => Document::of(&validate::motion(seeds, &*progress)?),
+        Goal::Safety => Document::of(&validate::safety(seeds, &std::env::current_exe()?, &*progress)?),
     }?)
 }

@@ -113,4 +113,12 @@ impl Progress for Bar {
             let _ = writeln!(std::io::stderr().lock(), "{text}");
         });
     }
+
+    /// One line of standard input: `yes`, and nothing else, is a yes. Where nobody types, it is a no.
+    fn confirm(&self, question: &str) -> bool {
+        self.say(&format!("{question}\nType yes: "));
+        let mut line = String::new();
+        let read = std::io::stdin().read_line(&mut line);
+        read.is_ok() && line.trim() == "yes"
+    }
 }

@@ -6,6 +6,10 @@
     clippy::panic,
     reason = "a test stops at the first surprise"
 )]
+#![allow(clippy::print_stderr, reason = "a test says what it measured")]
+
+#[path = "safety/resume.rs"]
+mod resume;
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -64,4 +68,18 @@ fn the_first_words_are_that_it_is_a_research_tool_and_that_the_physical_stop_com
     for words in ["research tool, not a medical device", "physical emergency stop comes first"] {
         assert!(first.contains(words), "{first}");
     }
+}
+
+/// Everything that can be lost, lost once: the process and the link over the wire, in wall time, since a killed process
+/// has no other.
+#[test]
+fn whatever_is_lost_the_arm_is_at_rest_within_100_ms_and_stays() {
+    let probepath = Path::new(env!("CARGO_BIN_EXE_probepath"));
+    let goals = probepath_scripts::validate::safety(1, probepath, &()).unwrap();
+    eprintln!("{goals}");
+    // How soon lost contact is noticed is the contact's own figure, over ten seeds and all skins.
+    let own = goals.rows.iter().filter(|row| !row.figure.starts_with("contact lost"));
+    let missed: Vec<_> = own.filter(|row| row.met == Some(false)).collect();
+    assert!(goals.rows.len() > 25 && missed.is_empty(), "{missed:#?}");
+    assert!(goals.rows.iter().all(|row| row.counted > 0));
 }

@@ -270,6 +270,12 @@ impl Guard {
         std::mem::take(&mut self.black_box)
     }
 
+    /// Whatever it allows now: from here on it wants a confirmation on a state newer than `last`.
+    pub const fn disarm(&mut self, trip: Trip, last: Stamp) {
+        self.phase = Phase::Stopped(trip);
+        self.stopped_at = Some(last);
+    }
+
     /// Something outside the guard ended the motion (the operator, the arm's fault, a panic): a fresh confirmation is
     /// needed too.
     pub(crate) const fn stop(&mut self, trip: Trip) {

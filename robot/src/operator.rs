@@ -1,7 +1,7 @@
 //! [`Operator`]: pause, resume and stop, from any thread, at any tick.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 
 /// What the operator asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +19,7 @@ pub enum Asked {
 #[derive(Clone, Debug, Default)]
 pub struct Operator {
     asked: Arc<AtomicU8>,
+    stops: Arc<AtomicU32>,
 }
 
 const GO: u8 = 0;
@@ -43,7 +44,13 @@ impl Operator {
 
     /// Stops what runs, and refuses what would run next until [`allow`](Self::allow).
     pub fn stop(&self) {
+        self.stops.fetch_add(1, Ordering::SeqCst);
         self.asked.store(STOP, Ordering::SeqCst);
+    }
+
+    /// How often a stop was asked for: who has heard one can tell whether another came.
+    pub fn stops(&self) -> u32 {
+        self.stops.load(Ordering::SeqCst)
     }
 
     /// Takes a stop back: a fresh decision that the arm may move.
@@ -79,6 +86,8 @@ mod tests {
         operator.pause();
         operator.resume();
         assert_eq!(operator.wish(), Asked::Stop);
+        operator.clone().stop();
+        assert_eq!(operator.stops(), 2);
         operator.allow();
         assert_eq!(operator.wish(), Asked::Go);
     }

@@ -43,6 +43,18 @@ impl Options {
         })
     }
 
+    /// Yes or no, when the key is there.
+    ///
+    /// # Errors
+    /// When the value is neither.
+    pub fn flag(&mut self, key: &'static str) -> Result<Option<bool>, String> {
+        let Some(value) = self.take(key) else { return Ok(None) };
+        value
+            .as_bool()
+            .map(Some)
+            .map_err(|_| format!("{}: `{key}` is true or false; found {}", self.step, describe(&value)))
+    }
+
     /// A text, when the key is there.
     ///
     /// # Errors

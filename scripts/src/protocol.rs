@@ -9,11 +9,14 @@
 //!
 //! A script decides what is done and in which order; every step is the session's, with the session's limits and guard
 //! below it. A stop works at any instant: inside a step the loop brakes the arm, between two steps the script ends. A
-//! script that never ends is ended by its budget. Errors give line and column.
+//! script that never ends is ended by its budget. Errors give line and column. A step that was stopped may be caught, and
+//! after a person's confirmation (`confirm()`) the scan goes on (`resume()`).
 
 mod calibration;
 mod steps;
+mod stops;
 
+use std::sync::atomic::AtomicU32;
 use std::sync::{Arc, Mutex};
 
 use probepath_robot::{Asked, Operator};
@@ -145,6 +148,14 @@ impl std::fmt::Display for Place {
 struct Stage {
     session: Arc<Mutex<Session>>,
     failed: Arc<Mutex<Option<SessionError>>>,
+    /// How many of the operator's stops the steps have told the script of.
+    heard: Arc<AtomicU32>,
+}
+
+impl Stage {
+    fn of(session: &Arc<Mutex<Session>>) -> Self {
+        Self { session: Arc::clone(session), failed: Arc::default(), heard: Arc::default() }
+    }
 }
 
 /// Runs a protocol on a session.
@@ -154,7 +165,7 @@ struct Stage {
 /// is at rest then, and the session keeps what was recorded.
 pub fn run(protocol: &Protocol, session: &Arc<Mutex<Session>>) -> Result<(), ProtocolError> {
     let operator = lock(session).operator().clone();
-    let stage = Stage { session: Arc::clone(session), failed: Arc::default() };
+    let stage = Stage::of(session);
     perform(protocol, &stage, &operator).map_err(|error| {
         let failed = lock(&stage.failed).take();
         explain(protocol, &error, failed, &operator)
@@ -181,14 +192,15 @@ fn engine(stage: &Stage, operator: &Operator) -> Engine {
     engine.set_max_string_size(1 << 20);
     engine.set_max_array_size(100_000);
     engine.set_max_map_size(10_000);
-    let watched = operator.clone();
-    engine.on_progress(move |_| (watched.wish() == Asked::Stop).then(|| "stopped".into()));
+    let (watched, watching) = (operator.clone(), stage.clone());
+    engine.on_progress(move |_| stops::ends(&watching, &watched).then(|| "stopped".into()));
     let session = Arc::clone(&stage.session);
     engine.on_print(move |text| lock(&session).say(text));
     let session = Arc::clone(&stage.session);
     engine.on_debug(move |text, _, position| lock(&session).say(&format!("{position:?}: {text}")));
     crate::quantity::register(&mut engine);
     steps::register(&mut engine, stage);
+    stops::register(&mut engine, stage);
     calibration::register(&mut engine, stage);
     engine
 }

@@ -15,6 +15,7 @@ mod motion;
 mod recorded;
 mod recorder;
 mod report;
+mod resume;
 mod scan;
 mod teach;
 mod true_contact;
@@ -59,9 +60,6 @@ use recorder::{Stand, Taped};
 /// This software, as exams and reports name it.
 pub const SOFTWARE: &str = concat!("probepath ", env!("CARGO_PKG_VERSION"));
 
-/// Speed in the air after a recovery (m/s): the guard lets the probe go at 10 mm/s at first.
-const RESUMING_M_S: f64 = 0.008;
-
 /// Name of the attachment that says how punctual the ticks of an arm on its wire were: lateness, step time, round trip.
 pub const PUNCTUAL: &str = "realtime.json";
 
@@ -100,6 +98,8 @@ pub struct Session {
     resuming: bool,
     /// How punctual its motions were, where the arm keeps the wall's time.
     punctual: Option<Punctual>,
+    /// A scan that was stopped on its way.
+    stopped: Option<resume::Underway>,
 }
 
 impl Session {
@@ -134,6 +134,7 @@ impl Session {
             warnings: Vec::new(),
             smoothed_m: None,
             report: None,
+            stopped: None,
         })
     }
 

@@ -5,6 +5,7 @@
 mod bench;
 mod force;
 mod motion;
+mod safety;
 mod soak;
 mod table1;
 mod table2;
@@ -16,6 +17,7 @@ use thiserror::Error;
 
 pub use force::force;
 pub use motion::{Shares, motion, shares};
+pub use safety::safety;
 pub use soak::{SoakWish, soak};
 pub use table1::table1;
 pub use table2::table2;

@@ -2,6 +2,7 @@
 //! column on whatever goes wrong.
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use probepath_teach_replay::{Path, Side};
 use rhai::{Array, Dynamic, Engine, EvalAltResult, Map, NativeCallContext};
@@ -27,13 +28,12 @@ const USAGE: &[(&str, &str)] = &[
     ("reconstruct", "reconstruct(images) or reconstruct(images, #{ seed_x: mm(20), seed_y: mm(30) })"),
     ("segment", "segment(\"CFA\", mm(0), mm(40))"),
     ("report", "report(lumen) or report(lumen, #{ segments: [segment(\"CFA\", mm(0), mm(40))] })"),
-    ("recover", "recover(), after the arm stopped by itself and the cause was found"),
     ("warn", "warn(\"what the reader must know\")"),
 ];
 
 /// How every step is written.
 pub(super) fn usage() -> impl Iterator<Item = &'static (&'static str, &'static str)> {
-    USAGE.iter().chain(super::calibration::USAGE)
+    USAGE.iter().chain(super::stops::USAGE).chain(super::calibration::USAGE)
 }
 
 /// The steps' names, for messages.
@@ -143,10 +143,6 @@ fn reports(engine: &mut Engine, stage: &Stage) {
         },
     );
     let s = stage.clone();
-    engine.register_fn("recover", move |context: NativeCallContext| -> Outcome<()> {
-        s.step(&context, Session::recover)
-    });
-    let s = stage.clone();
     engine.register_fn("warn", move |text: &str| lock(&s.session).warn(text));
 }
 
@@ -159,7 +155,11 @@ impl Stage {
     ) -> Outcome<T> {
         // What an earlier step met was caught by the script, and is no longer what ends it.
         *lock(&self.failed) = None;
-        step(&mut lock(&self.session)).map_err(|error| {
+        let mut session = lock(&self.session);
+        step(&mut session).map_err(|error| {
+            if error.is_stop() {
+                self.heard.store(session.operator().stops(), Ordering::SeqCst);
+            }
             let message = error.to_string();
             *lock(&self.failed) = Some(error);
             wrong(context, message)
@@ -214,6 +214,9 @@ fn scan_wish(map: Map) -> Result<ScanWish, String> {
     }
     if let Some(every) = options.quantity::<Length>("every")? {
         wish.every_m = Some(every.si());
+    }
+    if let Some(look) = options.flag("look")? {
+        wish.look = look;
     }
     options.done()?;
     Ok(wish)

@@ -99,7 +99,7 @@ fn a_stop_before_a_step_moves_nothing() {
 #[test]
 fn the_femoral_protocol_can_be_read() {
     let (session, out) = session("femoral");
-    let stage = Stage { session, failed: Arc::default() };
+    let stage = Stage::of(&session);
     engine(&stage, &Operator::new()).compile(FEMORAL).unwrap();
     std::fs::remove_dir_all(out).unwrap();
 }

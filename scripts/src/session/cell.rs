@@ -13,7 +13,7 @@ use probepath_frames::{Direction, Image, Point, Pose, Probe, Span, World};
 use probepath_robot::drivers::Address;
 use probepath_robot::drivers::ur::{UrArm, UrSettings};
 use probepath_robot::{
-    Guard, GuardLimits, Joints, Model, MotionLimits, Operator, Plane, Tilt, Workspace, probe_place,
+    Face, Guard, GuardLimits, Joints, Model, MotionLimits, Operator, Plane, Tilt, Workspace, probe_place,
 };
 use probepath_sim::{Bench, SimulatedCell};
 use probepath_us_capture::exam::Pace;
@@ -240,6 +240,7 @@ impl Cell {
             .map_err(wrong)?
             .within(self.workspace(), place)
             .leaning_at_most(self.tilt())
+            .pressing_with(Face::default())
             .listening_to(operator.clone()))
     }
 

@@ -143,6 +143,12 @@ pub enum SessionError {
     /// The images gave no calibration.
     #[error("calibration: {0}")]
     Spatial(#[from] SpatialError),
+    /// Nobody has said that the arm may move again.
+    #[error("the arm stays where it is: {why}")]
+    NotConfirmed {
+        /// Why.
+        why: String,
+    },
     /// A step before the one it needs.
     #[error("{0}")]
     Order(&'static str),

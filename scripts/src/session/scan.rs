@@ -2,12 +2,10 @@
 
 use probepath_frames::Stamp;
 use probepath_recon::{LumenReconstruction, LumenSettings, SeedPoint, reconstruct_lumen};
-use probepath_robot::Operator;
-use probepath_robot::motion::follow::Curve;
 use probepath_robot::motion::timing::PathSpeed;
+use probepath_robot::{Operator, Phase};
 use probepath_teach_replay::{
-    LiftOff, Path, Plan, PlanSettings, Replay, ReplayEnding, ReplayError, ReplayPhase, ReplaySettings,
-    ReplayStatus,
+    Path, Plan, PlanSettings, Replay, ReplayEnding, ReplayPhase, ReplaySettings, ReplayStatus,
 };
 use probepath_us_capture::exam::Attachment;
 use probepath_us_capture::{Capture, Counts, Keeping, PlacedBScan};
@@ -15,16 +13,13 @@ use probepath_us_capture::{Capture, Counts, Keeping, PlacedBScan};
 use super::figures::Figures;
 use super::motion::Motion;
 use super::recorder::{Eye, LATEST, Recorder, Stand};
-use super::{RESUMING_M_S, Session, SessionError, motion};
+use super::resume::Underway;
+use super::{Session, SessionError, motion};
 use crate::report::PathFigures;
 use crate::report::build::{ReportError, ScanFigures};
 
 /// Name of the attachment that keeps what a scan has to say, so that a report can be made again from the exam.
 pub(crate) const SCAN_FIGURES: &str = "scan.json";
-
-/// How far and how fast the probe is lifted off after too much force (m, m/s).
-const LIFT_M: f64 = 0.04;
-const LIFT_M_S: f64 = 0.02;
 
 /// How a path is to be scanned.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -110,24 +105,39 @@ impl Session {
             report.least_singular.1 * 1e3
         ));
         let keeping = wish.every_m.map_or(Keeping::All, |every_m| Keeping::Spaced { every_m });
-        let mut capture = wish.look.then(|| self.capture(keeping)).transpose()?;
-        let mut figures = Figures::new(path.curve().clone(), wish.force_n);
-        let mut images = Vec::new();
-        self.replay(plan, wish, capture.as_mut(), &mut figures, &mut images)?;
+        let capture = wish.look.then(|| self.capture(keeping)).transpose()?;
+        let figures = Figures::new(path.curve().clone(), wish.force_n);
+        self.stopped = None;
+        let underway = Underway::new(path.clone(), *wish, capture, figures);
+        let replay = self.replay_of(plan, wish)?;
+        self.go_along(underway, replay)
+    }
+
+    /// Replays what is left of a scan under way; a stop keeps what it brought.
+    pub(super) fn go_along(&mut self, mut underway: Underway, replay: Replay) -> Result<Scan, SessionError> {
+        match self.replay(replay, &mut underway) {
+            Ok(()) => self.finished(underway),
+            Err(error) => {
+                // Only where the guard wants a confirmation is there something to go on with.
+                if let Phase::Stopped(_) = self.guard.phase() {
+                    self.stopped = Some(underway);
+                }
+                Err(error)
+            }
+        }
+    }
+
+    /// What a scan brought.
+    pub(super) fn finished(&mut self, underway: Underway) -> Result<Scan, SessionError> {
+        let Underway { path, wish, mut capture, figures, mut images, .. } = underway;
         if let Some(capture) = &mut capture {
             capture.finish();
             self.keep_rest(capture, &mut images);
         }
         let counts = capture.map(|capture| capture.counts()).unwrap_or_default();
-        let figures_of_scan = self.scan_figures(path, wish, counts, &figures)?;
-        let scan = Scan {
-            images,
-            counts,
-            figures: figures_of_scan,
-            wish: *wish,
-            label: path.label().clone(),
-            followed: figures.followed(),
-        };
+        let figures_of_scan = self.scan_figures(&path, &wish, counts, &figures)?;
+        let (label, followed) = (path.label().clone(), figures.followed());
+        let scan = Scan { images, counts, figures: figures_of_scan, wish, label, followed };
         let (kept, force) = (scan.images.len(), &scan.figures.force_n);
         self.say(&format!("Scanned: {kept} B-scans kept, the force {:.2} N RMS off.", force.rms_error));
         Ok(scan)
@@ -166,43 +176,41 @@ impl Session {
         Ok(summary)
     }
 
-    fn plan(&mut self, path: &Path, wish: &ScanWish) -> Result<Plan, SessionError> {
-        let usual = PlanSettings::default();
+    pub(super) fn plan(&mut self, path: &Path, wish: &ScanWish) -> Result<Plan, SessionError> {
         let settings = PlanSettings {
             speed: PathSpeed::gentle(wish.speed_m_s),
             workspace: self.cell.workspace(),
-            air_speed: if self.resuming { RESUMING_M_S } else { usual.air_speed },
-            ..usual
+            ..PlanSettings::default()
         };
         let state = self.ask_where("planning", "plan")?;
         Ok(Plan::new(path, &self.cell.probe_arm(), &state.commanded, &settings)?)
     }
 
-    fn replay(
-        &mut self,
-        plan: Plan,
-        wish: &ScanWish,
-        capture: Option<&mut Capture>,
-        figures: &mut Figures,
-        images: &mut Vec<PlacedBScan>,
-    ) -> Result<(), SessionError> {
-        let length = plan.curve().length();
+    /// The replay of a plan at the wish's force.
+    pub(super) fn replay_of(&self, plan: Plan, wish: &ScanWish) -> Result<Replay, SessionError> {
         let settings = ReplaySettings {
             force_n: wish.force_n,
             soft_limit_n: self.cell.file.force.soft_n,
             ..ReplaySettings::default()
         };
+        Ok(Replay::new(plan, settings, self.opening.operator.clone())?)
+    }
+
+    fn replay(&mut self, mut replay: Replay, underway: &mut Underway) -> Result<(), SessionError> {
+        if self.resuming {
+            replay = replay.slowly();
+        }
         let operator: Operator = self.opening.operator.clone();
-        let mut replay = Replay::new(plan, settings, operator.clone())?;
-        let watch = replay.watch();
-        let stand = || stand_of(&watch.status(), length);
+        let (watch, begins_at, whole) = (replay.watch(), underway.at_m, underway.path.length());
+        let stand = || stand_of(&watch.status(), begins_at, whole);
+        let Underway { capture, images, figures, .. } = underway;
         let exam = self.exam.as_ref().ok_or(SessionError::Order("the exam was not begun"))?;
         let facts = &self.cell.facts;
         let arm = &mut *self.cell.arm;
         let punctual = self.punctual.as_mut();
         let moving = Motion { step: "scanning", arm, exam, facts, stand: &stand, punctual };
         let (paused, looked, latest) = (false, None, LATEST);
-        let eye = match (capture, self.cell.machine.as_mut()) {
+        let eye = match (capture.as_mut(), self.cell.machine.as_mut()) {
             (None, _) => None,
             (Some(_), None) => return Err(SessionError::NoMachine),
             (Some(capture), Some(machine)) => Some(Eye {
@@ -229,31 +237,19 @@ impl Session {
         let done = motion::perform(moving, &mut replay, &mut self.guard, &mut recorder);
         self.now = recorder.now;
         self.resuming &= done.is_err();
+        let status = watch.status();
+        underway.was(&status, begins_at);
         if let Err(SessionError::Motion { source, .. }) = &done
             && source.reason.asks_to_lift()
         {
-            self.lift()?;
+            self.lift_at_once()?;
+            underway.touches = false;
         }
         done?;
-        match watch.status().ending {
+        match status.ending {
             None | Some(ReplayEnding::Completed) => Ok(()),
             Some(other) => Err(SessionError::Ended { step: "scanning", why: other.to_string() }),
         }
-    }
-
-    /// After too much force: the probe comes off the skin along its own axis, and the force may only fall.
-    fn lift(&mut self) -> Result<(), SessionError> {
-        const STEP: &str = "lifting off";
-        let stand = || Stand { phase: "lift", along_m: None, look: false, fraction: 1.0 };
-        let mut lift = LiftOff::new(self.cell.probe_arm(), LIFT_M, LIFT_M_S).map_err(ReplayError::from)?;
-        let state = self.ask_where(STEP, "lift")?;
-        self.guard
-            .confirm_to_lift(&state)
-            .map_err(|trip| SessionError::Ended { step: STEP, why: trip.to_string() })?;
-        let exam = self.exam.as_ref().ok_or(SessionError::Order("the exam was not begun"))?;
-        let (arm, facts) = (&mut *self.cell.arm, &self.cell.facts);
-        let moving = Motion { step: STEP, arm, exam, facts, stand: &stand, punctual: self.punctual.as_mut() };
-        motion::perform(moving, &mut lift, &mut self.guard, &mut ())
     }
 
     /// What the capture still held back at the end.
@@ -281,7 +277,8 @@ impl Session {
     }
 }
 
-fn stand_of(status: &ReplayStatus, length: f64) -> Stand {
+/// `begins_at` metres along the path a replay of its rest begins.
+fn stand_of(status: &ReplayStatus, begins_at: f64, whole: f64) -> Stand {
     let phase = match status.phase {
         ReplayPhase::Approach => "approach",
         ReplayPhase::Descend => "descend",
@@ -290,6 +287,7 @@ fn stand_of(status: &ReplayStatus, length: f64) -> Stand {
         ReplayPhase::Lift => "lift",
         ReplayPhase::Done => "done",
     };
-    let along_m = matches!(status.phase, ReplayPhase::Follow).then_some(status.at_m);
-    Stand { phase, along_m, look: along_m.is_some(), fraction: status.at_m / length.max(1e-9) }
+    let at_m = begins_at + status.at_m;
+    let along_m = matches!(status.phase, ReplayPhase::Follow).then_some(at_m);
+    Stand { phase, along_m, look: along_m.is_some(), fraction: at_m / whole.max(1e-9) }
 }
