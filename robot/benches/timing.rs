@@ -2,6 +2,8 @@
 //! PROBEPATH_PYTHON naming a Python that has toppra, toppra times the same points beside it, with velocities and
 //! accelerations only: it knows no jerk.
 
+#![allow(clippy::print_stderr, reason = "a benchmark says what it measured")]
+
 use std::hint::black_box;
 use std::io::Write;
 use std::process::{Command, Stdio};

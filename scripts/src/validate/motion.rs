@@ -178,7 +178,7 @@ impl Columns {
 
     fn rows(&self) -> Vec<Goal> {
         let [position, velocity, acceleration, jerk] = &self.shares;
-        let worst = |values: &[f64]| values.iter().filter(|v| !(**v <= ROUNDING)).count() as f64;
+        let worst = |values: &[f64]| values.iter().filter(|v| v.is_nan() || **v > ROUNDING).count() as f64;
         let crossed: f64 = self.shares.iter().map(|values| worst(values)).sum();
         let ticks = self.ticks;
         vec![

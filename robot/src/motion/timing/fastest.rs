@@ -238,8 +238,8 @@ impl<'a> Fastest<'a> {
             let root = b.sqrt();
             let (slope, bend) = (-0.5 * weight / (b * root), 0.75 * weight / (b * b * root));
             self.bands.add(*at, &outer(basis, bend));
-            for k in 0..3 {
-                self.right[at + k] -= slope * basis[k];
+            for (k, part) in basis.iter().enumerate() {
+                self.right[at + k] -= slope * part;
             }
         }
         for place in 0..self.places.len() {
@@ -278,12 +278,12 @@ impl<'a> Fastest<'a> {
             let (up, down) = (force(0, value), force(1, -value));
             let (both, odd) = (weights[0] + weights[1], weights[0] - weights[1]);
             let row = &limit.row;
-            for i in 0..3 {
-                for k in i..3 {
-                    square[i][k] += both * row[i] * row[k];
+            for (i, here) in row.iter().enumerate() {
+                for (k, there) in row.iter().enumerate().skip(i) {
+                    square[i][k] += both * here * there;
                 }
-                square[0][i] += falls * odd * row[i];
-                pull[i] += row[i] * (up - down);
+                square[0][i] += falls * odd * here;
+                pull[i] += here * (up - down);
             }
             square[0][0] += falls * (odd * row[0] + falls * both);
             pull[0] += falls * (up + down);
