@@ -43,8 +43,8 @@ impl Bands {
             }
             for below in 1..3.min(n - i) {
                 let factor = pivot[below] / pivot[0];
-                for k in below..3 {
-                    self.rows[i + below][k - below] -= factor * pivot[k];
+                for (k, value) in pivot.iter().enumerate().skip(below) {
+                    self.rows[i + below][k - below] -= factor * value;
                 }
                 right[i + below] -= factor * right[i];
             }

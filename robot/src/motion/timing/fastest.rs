@@ -248,7 +248,7 @@ impl<'a> Fastest<'a> {
             let Place { at, basis, .. } = &self.places[place];
             let block = turned(&square, basis);
             self.bands.add(*at, &block);
-            for k in 0..3 {
+            for k in [0, 1, 2] {
                 self.right[at + k] -= pull[0] * basis[0][k] + pull[1] * basis[1][k] + pull[2] * basis[2][k];
             }
         }
@@ -331,7 +331,7 @@ impl<'a> Fastest<'a> {
             *top = (top.0 + far * by.0, top.1 + far_dual * by.1);
         }
         for (limit, change) in self.limits.iter_mut().zip(changes) {
-            for side in 0..2 {
+            for side in [0, 1] {
                 limit.slack[side] += far * change[side].0;
                 limit.dual[side] += far_dual * change[side].1;
             }
