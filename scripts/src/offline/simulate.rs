@@ -111,11 +111,11 @@ pub fn simulate(request: &SimulateRequest) -> Result<Simulating, SimulateError> 
     let host = request.host;
     // A cell may be served for days.
     let remembers_s = Some(REMEMBERS_S);
-    let machine = MachineServer::start(&cell, MachineServerConfig { host, time, ..Default::default() })?;
     let running = ControllerServer::start(
-        cell,
+        cell.clone(),
         ControllerConfig { host, time, remembers_s, ..ControllerConfig::default() },
     )?;
+    let machine = MachineServer::start(&cell, MachineServerConfig { host, time, ..Default::default() })?;
     let ports = PORTS.map(|(port, what)| Served { port, what }).to_vec();
     Ok(Simulating { cell: file.name, seed: request.seed, host, time, ports, arm, running, machine })
 }
