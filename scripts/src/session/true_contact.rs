@@ -11,6 +11,8 @@ const APART_S: f64 = 0.5;
 /// Standing still: the probe goes no further than this across its axis (m) within the time (s).
 const STILL_M: f64 = 20e-6;
 const STILL_S: f64 = 0.1;
+/// The path begins when the force is nearly there: the touch-down lasts this much longer (s).
+const TOUCHED_S: f64 = 1.0;
 /// The force gets this long to settle (s), and is then looked at for at least as long.
 const SETTLE_S: f64 = 1.0;
 
@@ -19,7 +21,7 @@ const SETTLE_S: f64 = 1.0;
 pub struct TrueContact {
     /// Root mean square of its error while the probe went along the path; standing still is left out.
     pub rms_n: f64,
-    /// How far it was above the set force before the path was followed.
+    /// How far it was above the set force from the touch until a second along the path.
     pub overshoot_n: f64,
     /// The largest, from touch-down to lift.
     pub most_n: f64,
@@ -53,7 +55,7 @@ impl Session {
         let squares: Vec<f64> = moving.map(|moment| (pressing(moment) - set).powi(2)).collect();
         Some(TrueContact {
             rms_n: (squares.iter().sum::<f64>() / squares.len() as f64).sqrt(),
-            overshoot_n: (most(moments.get(touched..begin)?) - set).max(0.0),
+            overshoot_n: (most(moments.get(touched..(begin + ticks(TOUCHED_S)).min(moments.len()))?) - set).max(0.0),
             most_n: most(moments.get(touched..)?),
             steady_n: steady(followed).map(|force| (force - set).abs()),
         })
