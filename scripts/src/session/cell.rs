@@ -107,7 +107,10 @@ fn ur(file: &CellFile, host: &str, facts: &Facts) -> Result<UrArm, SessionError>
     let carried = file.arm.carried().map_err(refused)?;
     let centre = Vector3::from(carried.centre_of_gravity_m);
     let usual = UrSettings::new(facts.model.clone(), facts.flange_from_probe, carried.payload_kg, centre);
-    let settings = UrSettings { stepped: file.arm.time == ControllerTime::Simulated, ..usual };
+    // The robot's own watchdog waits no less than our guard does: whichever is first, the arm stops.
+    let heartbeat = file.arm.heartbeat_ms.map_or(Span::ZERO, |ms| Span::from_seconds(ms * 1e-3));
+    let watchdog = usual.watchdog.max(heartbeat);
+    let settings = UrSettings { stepped: file.arm.time == ControllerTime::Simulated, watchdog, ..usual };
     Ok(UrArm::connect(host, settings)?)
 }
 

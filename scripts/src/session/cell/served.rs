@@ -36,7 +36,7 @@ impl CellFile {
         let machine = MachineFile {
             address: MachineAddress::Igtl { host, port: IGTL_PORT },
             device: None,
-            latency_ms: Some(nominal.image_latency.seconds() * 1e3),
+            latency_ms: Some(nominal.image_latency.nanoseconds() as f64 / 1e6),
             clock: Some(MachineClock::Arm),
             holder_error_mm: Some(config.machine.calibration_error_mm),
             setting: Some(SettingFile::of(&nominal.setting)),
@@ -46,4 +46,4 @@ impl CellFile {
 }
 
 /// How late a state of a simulated controller on the same computer may be (ms).
-const SERVED_HEARTBEAT_MS: f64 = 40.0;
+const SERVED_HEARTBEAT_MS: f64 = 80.0;
