@@ -240,7 +240,8 @@ fn while_the_arm_gives_way_the_guard_goes_on_watching() {
     let limits_of = GuardLimits { free_speed_m_s: 0.25, ..GuardLimits::default() };
     let slow_out = || Guard::new(GuardLimits { free_speed_m_s: 2.0, ..limits_of }, limits()).unwrap();
     let wall = Plane { through: Point::new(0.0, 0.10, 0.0), inward: Direction::y().reversed() };
-    let cases: [(Fails, Guard, fn(&Trip) -> bool); 4] = [
+    type Case = (Fails, Guard, fn(&Trip) -> bool);
+    let cases: [Case; 4] = [
         (Fails { hand: 2.1, ..Fails::default() }, slow_out().within(Workspace::new(), place()), |trip| {
             matches!(trip, Trip::ProbeSpeed { .. } | Trip::JointVelocity { .. })
         }),

@@ -26,7 +26,7 @@ impl Tilt {
     /// over may come back, but lean no further.
     pub fn exceeded(&self, next: &Pose<Base, Probe>, now: &Pose<Base, Probe>) -> Option<f64> {
         let tilt = self.of(next);
-        // Put so that NaN exceeds.
-        (!(tilt <= self.most_rad.max(self.of(now)))).then_some(tilt)
+        let most = self.most_rad.max(self.of(now));
+        (tilt > most || tilt.is_nan()).then_some(tilt)
     }
 }

@@ -64,7 +64,7 @@ pub fn identify(readings: &[ToolReading], down: &Direction<Base>) -> Result<Tool
     let (forces, torques) = (rows(readings, |r| r.wrench.force), rows(readings, |r| r.wrench.torque));
     let (Some(force), Some(torque)) = (
         solve(&matrix(&falls, 4, |u| DMatrix::from_column_slice(3, 1, u.as_slice())), &forces),
-        solve(&matrix(&falls, 6, |u| moments(u)), &torques),
+        solve(&matrix(&falls, 6, moments), &torques),
     ) else {
         let axis = "x and y";
         return Err(ToolError::Alike { axis, found_deg: 0.0, wanted_deg: LEAST_TURN_DEG });

@@ -83,8 +83,8 @@ impl ZeroWatch {
     pub fn step(&mut self, read: &Wrench<Probe>, base_from_probe: &Pose<Base, Probe>) -> Air {
         let beyond = self.tool.touching(read, base_from_probe, &self.down);
         let (here, force_n) = (base_from_probe.origin(), beyond.force.norm());
-        // Written so that no number counts as a touch.
-        if !(force_n < self.settings.touch_n) {
+        // What is no number counts as a touch.
+        if force_n >= self.settings.touch_n || force_n.is_nan() {
             self.touched = Some(here);
         }
         let near = self.touched.is_some_and(|touched| touched.distance(&here) < self.settings.away_m);

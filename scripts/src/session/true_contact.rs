@@ -55,7 +55,8 @@ impl Session {
         let squares: Vec<f64> = moving.map(|moment| (pressing(moment) - set).powi(2)).collect();
         Some(TrueContact {
             rms_n: (squares.iter().sum::<f64>() / squares.len() as f64).sqrt(),
-            overshoot_n: (most(moments.get(touched..(begin + ticks(TOUCHED_S)).min(moments.len()))?) - set).max(0.0),
+            overshoot_n: (most(moments.get(touched..(begin + ticks(TOUCHED_S)).min(moments.len()))?) - set)
+                .max(0.0),
             most_n: most(moments.get(touched..)?),
             steady_n: steady(followed).map(|force| (force - set).abs()),
         })

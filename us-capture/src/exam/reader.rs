@@ -23,6 +23,10 @@ const RECORD_HEAD: u64 = 9;
 
 /// Something that an exam holds, in the order it was written.
 #[derive(Clone, Debug, PartialEq)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "one at a time, handed on at once: a box for every tick would cost more"
+)]
 pub enum ExamEvent {
     /// A tick of the control loop.
     Tick(TickRecord),
