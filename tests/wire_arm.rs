@@ -166,9 +166,9 @@ fn a_link_cut_in_the_middle_of_a_package_is_lost_and_the_arm_rests_by_itself() {
     });
     assert!(rested);
     let truth = running.cell().truth().moments();
-    let moves =
+    let mut moves =
         truth.windows(2).filter(|pair| pair[1].joints.zip(&pair[0].joints, |b, a| b - a).largest() > 2e-6);
-    let stopped = moves.last().map(|pair| pair[1].stamp).unwrap();
+    let stopped = moves.next_back().map(|pair| pair[1].stamp).unwrap();
     let after = stopped - last.stamp;
     assert!(after <= Span::from_milliseconds(100), "it moved for {after:?} after the last state");
     arm.recover().unwrap();
@@ -261,9 +261,9 @@ fn a_host_that_falls_silent_in_motion_leaves_the_arm_at_rest_and_the_next_exchan
     std::thread::sleep(Duration::from_millis(600));
     assert!(running.is_at_rest());
     let moments = running.cell().truth().moments();
-    let moved =
+    let mut moved =
         moments.windows(2).filter(|pair| pair[1].joints.zip(&pair[0].joints, |b, a| b - a).largest() > 2e-6);
-    let after = moved.last().map(|pair| pair[1].stamp).unwrap() - last.stamp;
+    let after = moved.next_back().map(|pair| pair[1].stamp).unwrap() - last.stamp;
     assert!(after <= Span::from_milliseconds(100), "it moved for {after:?} after our last word");
     let fault = (0..3).find_map(|_| arm.exchange(&Command::Stay).err()).unwrap();
     assert!(matches!(fault, ArmFault::WatchdogStop { .. }), "{fault}");

@@ -1,5 +1,7 @@
 //! How long a tick of the contact takes: `cargo bench -p probepath-robot --bench contact`.
 
+#![allow(clippy::expect_used, reason = "a bench stops at the first surprise")]
+
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};

@@ -14,7 +14,8 @@ use crate::screen::{Document, Screen};
 /// When nothing can be served.
 pub fn perform(args: Simulate, screen: &Screen) -> Outcome {
     let (stop, stopped) = mpsc::channel();
-    ctrlc::set_handler(move || drop(stop.send(())))?;
+    // Nobody listens any more once it stops by itself.
+    ctrlc::set_handler(move || stop.send(()).unwrap_or(()))?;
     let serving = simulate(&SimulateRequest {
         cell: args.cell,
         seed: args.seed,

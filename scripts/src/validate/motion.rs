@@ -330,7 +330,7 @@ fn stopped(seed: u64, out: &Path) -> Result<[f64; 2], SessionError> {
     let limit = larger(larger(found.velocity, found.acceleration), found.jerk);
     let first = exam.ticks.iter().position(|record| record.stamp > taught_until).unwrap_or(0);
     let word = first as u64 + TICKS_BETWEEN * watch.told.load(Ordering::SeqCst).saturating_sub(1);
-    let last = exam.ticks.last().map(|record| record.commanded.clone());
+    let last = exam.ticks.last().map(|record| record.commanded);
     let moving =
         exam.ticks.iter().rposition(|record| Some(&record.commanded) != last.as_ref()).unwrap_or(0) as u64;
     // The first tick of the motion may be one or two later than `first`: then the word was as much later, and this

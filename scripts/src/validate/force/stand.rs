@@ -25,7 +25,7 @@ impl Stand {
 
 impl Progress for Stand {
     fn at(&self, step: &str, fraction: f64) {
-        if step != "scanning" || fraction < FROM || fraction > 0.99 {
+        if step != "scanning" || !(FROM..=0.99).contains(&fraction) {
             return;
         }
         match self.bars.fetch_add(1, Ordering::Relaxed) {

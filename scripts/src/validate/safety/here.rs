@@ -162,7 +162,7 @@ impl Scene {
         guard: Guard,
     ) -> Ended {
         let ms = |stamp: Stamp| (stamp - happened).seconds() * 1e3;
-        let changed = rows.windows(2).filter(|pair| pair[0].1 != pair[1].1).last();
+        let changed = rows.windows(2).rfind(|pair| pair[0].1 != pair[1].1);
         let rest_ms = changed.map_or(f64::NAN, |pair| ms(pair[1].0).max(0.0));
         let moments = self.cell.truth().moments();
         let stays = moments.last().map(|moment| moment.world_from_probe.origin());
