@@ -18,8 +18,8 @@ const DRIFT_PPM: i64 = 100;
 /// use probepath_frames::{ClockOffset, HostClock, ImageClock, Span, Stamp};
 ///
 /// let mut offset = ClockOffset::<ImageClock, HostClock>::with_memory(Span::from_milliseconds(60_000));
-/// let at = |ms| Stamp::from_nanoseconds(1_000_000 * ms);
-/// let here = |ms| Stamp::from_nanoseconds(1_000_000 * ms);
+/// let at = |ms: i64| Stamp::from_nanoseconds(1_000_000 * ms);
+/// let here = |ms: i64| Stamp::from_nanoseconds(1_000_000 * ms);
 /// assert_eq!(offset.hear(at(0), here(107)), Span::ZERO);
 /// offset.hear(at(10), here(115));
 /// assert_eq!(offset.hear(at(20), here(128)), Span::from_nanoseconds(3_000_000 - 1_300));

@@ -3,7 +3,7 @@
 //! ```
 //! use probepath_us_capture::igtl::{Decoder, Image, Message, encode_image};
 //!
-//! let image = Image { columns: 2, rows: 3, spacing_mm: [0.1, 0.2], pixels: vec![1, 2, 3, 4, 5, 6] };
+//! let image = Image { columns: 2, rows: 3, spacing_mm: [0.125, 0.25], pixels: vec![1, 2, 3, 4, 5, 6] };
 //! let bytes = encode_image("Probe", 7, 1_500_000_000, &image)?;
 //! let mut decoder = Decoder::default();
 //! let mut unread = &bytes[..];
