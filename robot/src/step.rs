@@ -20,21 +20,22 @@ mod behind;
 mod brake;
 mod posture;
 mod program;
+mod settings;
 mod singular;
 
 use std::fmt;
 
 use nalgebra::Isometry3;
 use probepath_frames::{Base, Flange, Pose, Probe, Span};
-use thiserror::Error;
 
 use crate::model::solve::{between, least_step, missing};
 use crate::model::{Reach, Vector6};
-use crate::{JointBound, Joints, Limiter, LimitsError, MAX_JOINTS, Model, MotionLimits, Plane, Workspace};
+use crate::{JointBound, Joints, Limiter, LimitsError, MAX_JOINTS, Model, MotionLimits, Plane};
 pub use behind::Behind;
 use brake::Together;
 use posture::Posture;
 use program::{Answer, Near, PLANES, Wanted};
+pub use settings::{StepError, StepSettings};
 use singular::Weakest;
 
 /// Joints that a probe needs to go anywhere.
@@ -54,58 +55,6 @@ const SLOW_SINGULAR: f64 = 6.0;
 const SLOWEST: f64 = 0.05;
 /// A part of the way above this is all of it.
 const WHOLE: f64 = 1.0 - 1e-9;
-
-/// What a step keeps besides the joints' limits.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StepSettings {
-    /// Where the probe's origin may be.
-    pub workspace: Workspace,
-    /// Room that is kept to every plane (m): what the arm may be off from where it was commanded.
-    pub margin_m: f64,
-    /// The smallest singular value of the probe's Jacobian that is gone to; from six times it on the joints slow down.
-    pub least_singular: f64,
-    /// Part of the joints' acceleration and jerk that slowing down along the way counts on; the rest keeps the way.
-    pub brake_share: f64,
-}
-
-impl Default for StepSettings {
-    fn default() -> Self {
-        Self { workspace: Workspace::new(), margin_m: 0.0005, least_singular: 0.01, brake_share: 0.5 }
-    }
-}
-
-/// Settings or an arm that no step can be made with, or a goal that is no number.
-#[derive(Clone, Debug, Error, PartialEq)]
-#[non_exhaustive]
-pub enum StepError {
-    /// A setting that cannot be.
-    #[error("the step's {name} is {value}; it must be finite and from {least} to {most}")]
-    Setting {
-        /// Its name.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// The least it may be.
-        least: f64,
-        /// The most it may be.
-        most: f64,
-    },
-    /// Too few joints for six directions, or another number than the limits have.
-    #[error("the arm has {found} joints: a probe needs {LEAST_JOINTS} to {MAX_JOINTS}")]
-    Joints {
-        /// How many.
-        found: usize,
-    },
-    /// The joints' limits cannot be kept.
-    #[error("{0}")]
-    Limits(#[from] LimitsError),
-    /// A pose or a velocity that is not finite; nothing was moved.
-    #[error("the {what} of the next step is not finite")]
-    NotFinite {
-        /// Which.
-        what: &'static str,
-    },
-}
 
 /// What the probe is to do in one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -507,18 +456,6 @@ impl Stepper {
         self.left = None;
         let position = self.limiter.brake();
         Stepped { position, part: 0.0, binding, off: (0.0, 0.0) }
-    }
-}
-
-impl StepSettings {
-    fn check(&self) -> Result<(), StepError> {
-        let numbers = [
-            ("margin", self.margin_m, 0.0, 0.1),
-            ("least singular value", self.least_singular, 1e-4, 1.0),
-            ("share of the brake", self.brake_share, 0.05, 1.0),
-        ];
-        let bad = numbers.into_iter().find(|(_, value, least, most)| !(value >= least && value <= most));
-        bad.map_or(Ok(()), |(name, value, least, most)| Err(StepError::Setting { name, value, least, most }))
     }
 }
 

@@ -6,6 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use super::*;
+use crate::Workspace;
 use crate::motion::timing::SpeedRamp;
 
 const DT: f64 = 0.002;
