@@ -18,7 +18,7 @@ use stand::Stand;
 
 /// The paths' speeds (m/s).
 const SPEEDS: [f64; 2] = [0.010, 0.020];
-/// Bounds of the issue (N).
+/// What the force has to keep (N).
 const HELD_N: f64 = 0.10;
 const OVERSHOOT_N: f64 = 0.5;
 const STEADY_N: f64 = 0.02;
@@ -50,7 +50,7 @@ pub fn force(seeds: u64, progress: &dyn Progress) -> Result<Goals, ValidateError
     Ok(Goals::new("force: 5 N along the leg at 10 and 20 mm/s, skin of 0.3 to 3 N/mm", seeds, rows))
 }
 
-/// The five of the issue; the fifth, which it leaves open, is skin that is suddenly stiffer and dry.
+/// Breathing, a leg that moves, a bump, a sensor that drifts, and skin that is suddenly stiffer and dry.
 fn disturbances() -> [(&'static str, DisturbanceConfig); 5] {
     [
         ("breathing ±5 mm, 0.25 Hz", DisturbanceConfig::breathing()),
