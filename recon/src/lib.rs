@@ -46,7 +46,9 @@ pub use compare::{AreaPair, Closest, CompareError, Comparison, DistanceStatistic
 pub use error::ReconError;
 pub use lumen::{Contour, ImageLumen, NoLumen, segment};
 pub use mesh::{Mesh, MeshError};
-pub use reconstruct::{ImageCounts, LumenReconstruction, ReconWarning, reconstruct_lumen};
+pub use reconstruct::{
+    ImageCounts, LumenReconstruction, ReconWarning, check_sweep, reconstruct_from, reconstruct_lumen,
+};
 pub use section::{Section, SectionMeasure};
 pub use settings::{LumenSettings, PointSpread, SeedPoint};
 pub use stenosis::{Reference, ReferenceSide, Stenosis};

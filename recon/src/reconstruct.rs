@@ -88,12 +88,28 @@ pub fn reconstruct_lumen(
     images: &[PlacedBScan],
     settings: &LumenSettings,
 ) -> Result<LumenReconstruction, ReconError> {
+    check_sweep(images, settings)?;
+    reconstruct_from(segment(images, settings), settings)
+}
+
+/// Whether images and settings can be worked with: what every way to a reconstruction asks first.
+///
+/// # Errors
+/// When the settings make no sense, there is no image, or one has no size or place.
+pub fn check_sweep(images: &[PlacedBScan], settings: &LumenSettings) -> Result<(), ReconError> {
     settings.check()?;
     images.iter().try_for_each(check)?;
-    if images.is_empty() {
-        return Err(ReconError::NoImages);
-    }
-    let mut lumens = segment(images, settings);
+    if images.is_empty() { Err(ReconError::NoImages) } else { Ok(()) }
+}
+
+/// The same from what each image gave, whoever found it.
+///
+/// # Errors
+/// When too few images show a lumen.
+pub fn reconstruct_from(
+    mut lumens: Vec<ImageLumen>,
+    settings: &LumenSettings,
+) -> Result<LumenReconstruction, ReconError> {
     let centreline = centreline(&mut lumens)?;
     let contours: Vec<&Contour> = lumens.iter().filter_map(|image| image.lumen.as_ref().ok()).collect();
     let spacing = centreline.length_m() / contours.len() as f64;
