@@ -117,6 +117,11 @@ impl Centreline {
         Some(found)
     }
 
+    /// Where along the curve the sample nearest to a place lies (m).
+    pub(crate) fn nearest_m(&self, place: &Vector3<f64>) -> Option<f64> {
+        Some(self.nearest(place)?.at_m)
+    }
+
     /// The nearest sample to a place.
     pub(crate) fn nearest(&self, place: &Vector3<f64>) -> Option<&CentrelinePoint> {
         let distance = |point: &CentrelinePoint| (point.point.vector() - place).norm_squared();

@@ -36,6 +36,7 @@ mod settings;
 mod spline;
 mod stenosis;
 mod surface;
+mod vessel;
 pub mod volume;
 
 #[cfg(test)]
@@ -53,3 +54,4 @@ pub use section::{Section, SectionMeasure};
 pub use settings::{LumenSettings, PointSpread, SeedPoint};
 pub use stenosis::{Reference, ReferenceSide, Stenosis};
 pub use surface::LumenSurface;
+pub use vessel::Vessel;

@@ -8,13 +8,10 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::centreline::Centreline;
-use crate::surface::{self, LumenSurface, Tube};
-use crate::{
-    Contour, ImageLumen, LumenSettings, NoLumen, ReconError, Section, Stenosis, section, segment, stenosis,
-};
+use crate::surface::LumenSurface;
+use crate::vessel::{Place, Vessel};
+use crate::{Contour, ImageLumen, LumenSettings, NoLumen, ReconError, Section, Stenosis, segment};
 
-/// Sections are this far apart (m).
-const SECTION_STEP_M: f64 = 0.5e-3;
 /// A contour whose centre is farther than this from the smooth centreline is of something else (m).
 const FAR_M: f64 = 3e-3;
 /// The least number of contours that make a surface.
@@ -25,13 +22,15 @@ const LEAST_CONTOURS: usize = 4;
 pub struct LumenReconstruction {
     /// What each image gave, in their order.
     pub images: Vec<ImageLumen>,
-    /// The surface's grid.
+    /// The vessels: the one followed first, then its branches.
+    pub vessels: Vec<Vessel>,
+    /// The first vessel's surface, as a grid.
     pub surface: LumenSurface,
-    /// The curve along its middle.
+    /// The curve along the first vessel's middle.
     pub centreline: Centreline,
-    /// Sections normal to it, every half millimetre.
+    /// The first vessel's sections normal to it, every half millimetre.
     pub sections: Vec<Section>,
-    /// The narrowings found, along the vessel.
+    /// The first vessel's narrowings, along it.
     pub stenoses: Vec<Stenosis>,
     /// How many images there were, and how many showed a lumen.
     pub counts: ImageCounts,
@@ -112,16 +111,19 @@ pub fn reconstruct_from(
 ) -> Result<LumenReconstruction, ReconError> {
     let centreline = centreline(&mut lumens)?;
     let contours: Vec<&Contour> = lumens.iter().filter_map(|image| image.lumen.as_ref().ok()).collect();
-    let spacing = centreline.length_m() / contours.len() as f64;
-    let tube = Tube::fit(&centreline, &contours, spacing)?;
-    let seen = places(&centreline, &contours);
-    let measured = |at: f64| is_measured(&seen, at, settings.longest_gap_m);
-    let surface = surface::grid(&centreline, &tube, settings.grid, measured);
-    let sections = section::sections(&centreline, &tube, SECTION_STEP_M, measured);
-    let stenoses = stenosis::find(&sections, settings.least_percent_area);
+    let (vessel, seen) = Vessel::along(0, centreline, &contours, settings)?;
     let counts = counts(&lumens);
     let warnings = warnings(&seen, &counts, settings);
-    Ok(LumenReconstruction { surface, sections, stenoses, counts, warnings, centreline, images: lumens })
+    Ok(LumenReconstruction {
+        surface: vessel.surface.clone(),
+        centreline: vessel.centreline.clone(),
+        sections: vessel.sections.clone(),
+        stenoses: vessel.stenoses.clone(),
+        vessels: vec![vessel],
+        images: lumens,
+        counts,
+        warnings,
+    })
 }
 
 fn check(image: &PlacedBScan) -> Result<(), ReconError> {
@@ -182,35 +184,20 @@ fn counts(lumens: &[ImageLumen]) -> ImageCounts {
     counts
 }
 
-/// Where along the centreline contours lie, in order, and whether they branch.
-fn places(line: &Centreline, contours: &[&Contour]) -> Vec<(f64, bool)> {
-    let place = |contour: &&Contour| Some((line.nearest(&contour.centre.vector())?.at_m, contour.branches));
-    let mut places: Vec<(f64, bool)> = contours.iter().filter_map(place).collect();
-    places.sort_by(|a, b| a.0.total_cmp(&b.0));
-    places
-}
-
-/// Whether contours lie on both sides of a place, no farther apart than the longest gap.
-fn is_measured(seen: &[(f64, bool)], at: f64, longest_gap: f64) -> bool {
-    let after = seen.partition_point(|place| place.0 < at);
-    let next = seen.get(after).map_or(f64::INFINITY, |place| place.0 - at);
-    let last = after.checked_sub(1).and_then(|i| seen.get(i)).map_or(f64::INFINITY, |place| at - place.0);
-    // At the ends a contour within half a gap will do.
-    next + last <= longest_gap || next.min(last) <= 0.25 * longest_gap
-}
-
-fn warnings(seen: &[(f64, bool)], counts: &ImageCounts, settings: &LumenSettings) -> Vec<ReconWarning> {
+fn warnings(seen: &[Place], counts: &ImageCounts, settings: &LumenSettings) -> Vec<ReconWarning> {
     let mut warnings = Vec::new();
     let percent = 100.0 * counts.without_lumen as f64 / counts.images.max(1) as f64;
     if percent > 10.0 {
         warnings.push(ReconWarning::ManyWithout { percent });
     }
-    for pair in seen.windows(2).filter(|pair| pair[1].0 - pair[0].0 > settings.longest_gap_m) {
-        warnings.push(ReconWarning::Gap { from_mm: pair[0].0 * 1e3, to_mm: pair[1].0 * 1e3 });
+    for pair in seen.windows(2).filter(|pair| pair[1].at_m - pair[0].at_m > settings.longest_gap_m) {
+        warnings.push(ReconWarning::Gap { from_mm: pair[0].at_m * 1e3, to_mm: pair[1].at_m * 1e3 });
     }
     // Three in a row: one alone is speckle.
-    for run in seen.chunk_by(|a, b| a.1 == b.1).filter(|run| run.len() >= 3 && run[0].1) {
-        warnings.push(ReconWarning::Branch { from_mm: run[0].0 * 1e3, to_mm: run[run.len() - 1].0 * 1e3 });
+    for run in seen.chunk_by(|a, b| a.branches == b.branches).filter(|run| run.len() >= 3 && run[0].branches)
+    {
+        let to_mm = run[run.len() - 1].at_m * 1e3;
+        warnings.push(ReconWarning::Branch { from_mm: run[0].at_m * 1e3, to_mm });
     }
     warnings
 }

@@ -44,7 +44,13 @@ impl Knots {
         (first, values.map(|value| value / (self.step * self.step)))
     }
 
-    fn interval(&self, at: f64) -> (usize, f64) {
+    /// How many intervals there are.
+    pub(crate) const fn intervals(&self) -> usize {
+        self.intervals
+    }
+
+    /// The interval of a place, and how far along it the place lies (0 to 1; beyond the ends, less or more).
+    pub(crate) fn interval(&self, at: f64) -> (usize, f64) {
         let x = (at - self.start) / self.step;
         let first = x.floor().clamp(0.0, self.intervals as f64 - 1.0);
         (first as usize, x - first)
@@ -88,18 +94,26 @@ impl Banded {
         }
     }
 
+    /// The largest difference of two elements in the same place.
+    #[cfg(test)]
+    pub(crate) fn largest_difference(&self, other: &Self) -> f64 {
+        self.rows.iter().zip(&other.rows).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    }
+
     /// The Cholesky factor, when the matrix is positive definite.
     pub(crate) fn factor(mut self) -> Option<Factor> {
         let width = self.band + 1;
         for i in 0..self.size {
+            let (before, row) = self.rows.split_at_mut(i * width);
             let low = i.saturating_sub(self.band);
             for j in low..=i {
                 let from = low.max(j.saturating_sub(self.band));
-                let (a, b) = (i * width + self.band - i, j * width + self.band - j);
-                let dot: f64 = (from..j).map(|k| self.rows[a + k] * self.rows[b + k]).sum();
-                let left = self.rows[a + j] - dot;
-                self.rows[a + j] = if j < i {
-                    left / self.rows[b + j]
+                let (a, b) = (self.band + from - i, self.band + from - j);
+                let length = j - from;
+                let other = if j < i { &before[j * width..] } else { &*row };
+                let left = row[a + length] - dot(&row[a..a + length], &other[b..b + length]);
+                row[a + length] = if j < i {
+                    left / other[self.band]
                 } else if left > 0.0 && left.is_finite() {
                     left.sqrt()
                 } else {
@@ -111,6 +125,18 @@ impl Banded {
     }
 }
 
+/// The sum of products, in four sums side by side.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let (fours, rest) = (a.chunks_exact(4), a.chunks_exact(4).remainder());
+    let mut sums = [0.0; 4];
+    for (x, y) in fours.zip(b.chunks_exact(4)) {
+        (0..4).for_each(|k| sums[k] += x[k] * y[k]);
+    }
+    let beyond = a.len() - rest.len();
+    let tail: f64 = rest.iter().zip(&b[beyond..]).map(|(x, y)| x * y).sum();
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + tail
+}
+
 /// A lower triangle whose product with its transpose is the matrix.
 pub(crate) struct Factor(Banded);
 
@@ -118,16 +144,71 @@ impl Factor {
     /// Solves for one right-hand side.
     pub(crate) fn solve(&self, mut right: Vec<f64>) -> Vec<f64> {
         let Banded { size, band, rows } = &self.0;
-        let at = |i: usize, j: usize| rows[i * (band + 1) + band + j - i];
+        let row = |i: usize| &rows[i * (band + 1)..(i + 1) * (band + 1)];
         for i in 0..*size {
-            let dot: f64 = (i.saturating_sub(*band)..i).map(|j| at(i, j) * right[j]).sum();
-            right[i] = (right[i] - dot) / at(i, i);
+            let low = i.saturating_sub(*band);
+            let known = dot(&row(i)[band + low - i..*band], &right[low..i]);
+            right[i] = (right[i] - known) / row(i)[*band];
         }
         for i in (0..*size).rev() {
-            let dot: f64 = (i + 1..(i + band + 1).min(*size)).map(|j| at(j, i) * right[j]).sum();
-            right[i] = (right[i] - dot) / at(i, i);
+            let low = i.saturating_sub(*band);
+            right[i] /= row(i)[*band];
+            let value = right[i];
+            let above = row(i)[band + low - i..*band].iter().zip(&mut right[low..i]);
+            above.for_each(|(element, sum)| *sum -= element * value);
         }
         right
+    }
+
+    /// The elements of the matrix's inverse that lie within the band (Takahashi, Fagan and Chen 1973): from the last
+    /// row up, `Z_ij = (d_ij / L_ii - sum_k L_ki Z_kj) / L_ii`, `k` from `i + 1` to `i + band`.
+    pub(crate) fn inverse_in_band(&self) -> InBand {
+        let Banded { size, band, rows } = &self.0;
+        let mut inverse = InBand { band: *band, rows: vec![0.0; size * (2 * band + 1)] };
+        let mut column = vec![0.0; *band];
+        for i in (0..*size).rev() {
+            let diagonal = rows[i * (band + 1) + band];
+            let last = (i + band).min(size - 1);
+            for k in i + 1..=last {
+                column[k - i - 1] = rows[k * (band + 1) + band + i - k] / diagonal;
+            }
+            for j in (i..=last).rev() {
+                let own = if i == j { 1.0 / (diagonal * diagonal) } else { 0.0 };
+                let from = inverse.place(j, i + 1);
+                let known = &inverse.rows[from..from + last - i];
+                let value = own - dot(&column[..last - i], known);
+                let (one, other) = (inverse.place(i, j), inverse.place(j, i));
+                inverse.rows[one] = value;
+                inverse.rows[other] = value;
+            }
+        }
+        inverse
+    }
+}
+
+/// The part of a symmetric matrix within a band.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct InBand {
+    band: usize,
+    /// Row i holds (i, i - band) to (i, i + band).
+    rows: Vec<f64>,
+}
+
+impl InBand {
+    const fn place(&self, i: usize, j: usize) -> usize {
+        i * (2 * self.band + 1) + self.band + j - i
+    }
+
+    /// The element (i, j), which must lie within the band.
+    #[cfg(test)]
+    pub(crate) fn get(&self, i: usize, j: usize) -> f64 {
+        self.rows[self.place(i, j)]
+    }
+
+    /// The elements (i, from) to (i, from + count), which must lie within the band.
+    pub(crate) fn part(&self, i: usize, from: usize, count: usize) -> &[f64] {
+        let start = self.place(i, from);
+        &self.rows[start..start + count]
     }
 }
 
@@ -172,9 +253,17 @@ mod tests {
                 }
             }
             let right: Vec<f64> = (0..size).map(|_| dice.uniform()).collect();
-            let ours = banded.factor().expect("positive definite").solve(right.clone());
-            let theirs = dense.cholesky().expect("positive definite").solve(&DVector::from_vec(right));
-            assert!((DVector::from_vec(ours) - theirs).amax() < 1e-13);
+            let ours = banded.factor().expect("positive definite");
+            let theirs = dense.cholesky().expect("positive definite");
+            let apart =
+                DVector::from_vec(ours.solve(right.clone())) - theirs.solve(&DVector::from_vec(right));
+            assert!(apart.amax() < 1e-13);
+            let (inverse, exact) = (ours.inverse_in_band(), theirs.inverse());
+            for i in 0..size {
+                for j in i.saturating_sub(band)..size.min(i + band + 1) {
+                    assert!((inverse.get(i, j) - exact[(i, j)]).abs() < 1e-14, "{size}: {i}, {j}");
+                }
+            }
         }
     }
 }
