@@ -28,7 +28,7 @@ for count in (1000, len(points)):
         trajectory = found.compute_trajectory()
         took.append(time.perf_counter() - start)
     print(
-        f"toppra {version("toppra")}, {count} grid points: {np.median(took) * 1e3:.1f} ms (median of 5), "
+        f"toppra {version('toppra')}, {count} grid points: {np.median(took) * 1e3:.1f} ms (median of 5), "
         f"the motion takes {trajectory.duration:.3f} s without a jerk limit",
         file=sys.stderr,
     )

@@ -1,5 +1,7 @@
 //! The fastest motion along a path, held against an optimum found by another road: `tests/golden/timing.json`, made by
-//! `tests/golden/make_timing.py` (IPOPT over time, where ours is an interior point over the distance).
+//! `tests/golden/make_timing.py` (IPOPT over time, where ours is an interior point over the distance); and, where only
+//! speed and acceleration count, against toppra's: `tests/golden/timing_toppra.json`, made by
+//! `tests/golden/make_timing_toppra.py`.
 
 #![allow(
     clippy::unwrap_used,
@@ -30,10 +32,14 @@ fn number(value: &Value, name: &str) -> f64 {
     value[name].as_f64().unwrap()
 }
 
-fn problems() -> Vec<Problem> {
-    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/golden/timing.json");
+fn golden(name: &str) -> Vec<Value> {
+    let file = format!("{}/../tests/golden/{name}", env!("CARGO_MANIFEST_DIR"));
     let golden: Value = serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap();
-    golden["problems"].as_array().unwrap().iter().map(problem).collect()
+    golden["problems"].as_array().unwrap().clone()
+}
+
+fn problems() -> Vec<Problem> {
+    golden("timing.json").iter().map(problem).collect()
 }
 
 fn problem(value: &Value) -> Problem {
@@ -112,6 +118,25 @@ fn the_motion_takes_within_two_percent_of_the_optimum_and_keeps_every_limit_at_t
         assert!(ratio < 1.02, "{}: {ratio}", problem.name);
         // The golden one asks its limits at places too, and so may be a little too quick; ours never.
         assert!(ratio > 0.99, "{}: {ratio}", problem.name);
+        assert!(shares.iter().all(|share| *share <= 1.0 + 1e-3), "{}: {shares:?}", problem.name);
+    }
+}
+
+/// Accelerations change within this (s): a jerk that hardly counts.
+const JERK_TIME_S: f64 = 0.001;
+
+#[test]
+fn where_only_acceleration_counts_it_takes_within_one_percent_of_what_toppra_finds() {
+    for (mut problem, toppra) in problems().into_iter().zip(golden("timing_toppra.json")) {
+        assert_eq!(toppra["name"].as_str(), Some(problem.name.as_str()));
+        problem.limits.jerk = problem.limits.acceleration.map(|a| a / JERK_TIME_S);
+        problem.wanted.jerk = problem.wanted.acceleration / JERK_TIME_S;
+        let timed = problem.timed();
+        let (shares, _) = problem.driven(&timed);
+        let seconds = number(&toppra, "duration_s");
+        let ratio = timed.duration_s() / seconds;
+        println!("{:<34} toppra {seconds:.4} s, ratio {ratio:.4}; shares {shares:.4?}", problem.name);
+        assert!(ratio > 0.999 && ratio < 1.01, "{}: {ratio}", problem.name);
         assert!(shares.iter().all(|share| *share <= 1.0 + 1e-3), "{}: {shares:?}", problem.name);
     }
 }

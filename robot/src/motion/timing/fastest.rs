@@ -15,7 +15,7 @@
 //! elimination.
 
 use super::bands::Bands;
-use super::way::Way;
+use super::way::{Motion, Way};
 use super::{MotionBounds, PathSpeed};
 
 /// A place where the limits are asked.
@@ -92,11 +92,12 @@ impl<'a> Fastest<'a> {
             right: vec![0.0; control.len()],
             control,
         };
+        let zigzag = zigzag_s(way, wanted);
         for (cell, tight) in tight.iter().enumerate() {
-            for part in found.asked(cell) {
+            let (h, middle) = (nodes[cell + 1] - nodes[cell], 0.5 * (nodes[cell] + nodes[cell + 1]));
+            for part in found.asked(cell, is_free(way, middle, h / zigzag, wanted)) {
                 found.ask(cell, *part, way, wanted, tight);
             }
-            let h = nodes[cell + 1] - nodes[cell];
             for part in GAUSS {
                 found.times.push((cell, 0.5 * h, basis(nodes, cell, part * h)[0]));
             }
@@ -105,12 +106,18 @@ impl<'a> Fastest<'a> {
         found
     }
 
-    /// Where in a cell the limits are asked: at both ends where the speed changes much inside, else in the middle.
-    fn asked(&self, cell: usize) -> &'static [f64] {
+    /// Where in a cell the limits are asked: at both ends where the speed changes much inside, else in the middle; and
+    /// at its beginning too where the jerk leaves the acceleration free to go up and down from node to node, which the
+    /// middles do not see.
+    fn asked(&self, cell: usize, free: bool) -> &'static [f64] {
         let h = |k: usize| self.nodes[k + 1] - self.nodes[k];
         let last = self.nodes.len() - 2;
         let even = |k: usize| (h(k) / h(cell) - 1.0).abs() < 1e-6;
-        if even(cell.saturating_sub(1)) && even((cell + 1).min(last)) { &[0.5] } else { &[0.0, 1.0] }
+        match even(cell.saturating_sub(1)) && even((cell + 1).min(last)) {
+            true if free => &[0.0, 0.5],
+            true => &[0.5],
+            false => &[0.0, 1.0],
+        }
     }
 
     fn ask(&mut self, cell: usize, part: f64, way: &Way, wanted: &PathSpeed, tight: &MotionBounds) {
@@ -338,6 +345,24 @@ impl<'a> Fastest<'a> {
         }
         self.right = direction;
     }
+}
+
+/// Where a bend uses this part of an acceleration at the steady speed, the acceleration matters.
+const MATTERS: f64 = 0.2;
+
+/// Whether the jerk leaves the acceleration free within a cell, and that matters: where even the steady speed is above
+/// `slow` the cell is too short for it.
+fn is_free(way: &Way, middle: f64, slow: f64, wanted: &PathSpeed) -> bool {
+    let slopes = way.at(middle);
+    let speed = way.steady(&slopes, wanted.speed);
+    speed < slow && way.shares(&slopes, &Motion { speed, ..Motion::default() })[1] > MATTERS
+}
+
+/// A cell that takes longer than this (s) lets the jerk turn a good part of the acceleration round in it.
+fn zigzag_s(way: &Way, wanted: &PathSpeed) -> f64 {
+    let [_, acceleration, jerk] = way.per();
+    let joints = (0..way.joints()).map(|joint| jerk[joint] / acceleration[joint]);
+    0.5 * joints.fold(wanted.acceleration / wanted.jerk, f64::min)
 }
 
 /// How much of the last gap the next step aims at.
