@@ -38,7 +38,7 @@ pub enum UrError {
         source: std::io::Error,
     },
     /// Somebody took the connection, and says nothing.
-    #[error("the {what} said nothing for {} s while {doing}; is it a UR controller?", .waited.as_secs_f64())]
+    #[error("the {what} said nothing for {:.1} s while {doing}; is it a UR controller?", .waited.as_secs_f64())]
     Silent {
         /// Who.
         what: &'static str,
@@ -124,7 +124,7 @@ pub enum UrError {
     #[error("a program runs on the controller that is not ours; stop it at the pendant first")]
     OtherProgram,
     /// Our script did not begin.
-    #[error("our script does not run: after {} s the program is {runtime} and the script {script}{said}", .waited.as_secs_f64())]
+    #[error("our script does not run: after {:.1} s the program is {runtime} and the script {script}{said}", .waited.as_secs_f64())]
     ScriptDidNotStart {
         /// How long it was waited for.
         waited: Duration,

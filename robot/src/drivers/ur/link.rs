@@ -14,6 +14,10 @@ use super::{UrError, clock, error};
 /// How long an answer may take while connecting.
 pub(super) const PATIENCE: Duration = Duration::from_secs(5);
 
+/// How long its first answer may take. A controller gives it within milliseconds; another server, a web server for one,
+/// may wait for more than we send.
+const FIRST_ANSWER: Duration = Duration::from_secs(2);
+
 /// The longest frame that a controller sends us: ours are below 500 bytes, and so are its words.
 const LONGEST: usize = 4096;
 
@@ -54,7 +58,7 @@ pub(super) struct Link {
 impl Link {
     /// Connects, agrees on version 2 and both recipes, and starts the packages.
     pub(super) fn open(host: &str) -> Result<Self, UrError> {
-        let socket = Socket::open(host, rtde::PORT, "RTDE server", PATIENCE)?;
+        let socket = Socket::open(host, rtde::PORT, "RTDE server", FIRST_ANSWER)?;
         let none = || Recipe::new(0, []);
         let version = ControllerVersion { major: 0, minor: 0, bugfix: 0, build: 0 };
         let mut link = Self {
@@ -70,6 +74,7 @@ impl Link {
             texts: 0,
         };
         link.version_2()?;
+        link.wait_at_most(PATIENCE)?;
         link.version = link.controller_version()?;
         Ok(link)
     }
