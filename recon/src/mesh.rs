@@ -6,7 +6,7 @@ mod vtp;
 
 use std::path::Path;
 
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Vector3};
 use probepath_frames::{Point, World};
 use thiserror::Error;
 
@@ -26,8 +26,19 @@ pub struct Mesh {
     pub points: Vec<Vector3<f64>>,
     /// Three points each.
     pub triangles: Vec<[u32; 3]>,
-    /// A number for every point, with its name (such as `error_mm`), when there is one.
-    pub values: Option<(String, Vec<f64>)>,
+    /// Numbers of the points, each with its name; PLY and VTP keep them.
+    pub scalars: Vec<PointScalars>,
+    /// A colour (red, green, blue) for every point, or none at all; PLY keeps them.
+    pub colours: Vec<[u8; 3]>,
+}
+
+/// A number for every point of a mesh.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PointScalars {
+    /// What it is, with its unit: `area_mm2`, `radius_mm`, `error_sd_mm`, `distance_mm`.
+    pub name: String,
+    /// One for every point, in their order; NaN where nothing is known.
+    pub values: Vec<f64>,
 }
 
 /// Why a mesh cannot be written or read.
@@ -113,6 +124,28 @@ impl Mesh {
             return Err(format!("triangle {i} names a point beyond the {count} there are"));
         }
         Ok(self)
+    }
+
+    /// The same mesh with one more number for every point. A missing number is NaN, one too many is dropped.
+    #[must_use]
+    pub fn with_scalars(mut self, name: impl Into<String>, mut values: Vec<f64>) -> Self {
+        values.resize(self.points.len(), f64::NAN);
+        let name = name.into();
+        self.scalars.retain(|scalars| scalars.name != name);
+        self.scalars.push(PointScalars { name, values });
+        self
+    }
+
+    /// The numbers of that name.
+    pub fn scalars(&self, name: &str) -> Option<&[f64]> {
+        self.scalars.iter().find(|scalars| scalars.name == name).map(|scalars| scalars.values.as_slice())
+    }
+
+    /// The same mesh somewhere else.
+    #[must_use]
+    pub fn moved(&self, by: &Isometry3<f64>) -> Self {
+        let points = self.points.iter().map(|p| by.transform_point(&(*p).into()).coords);
+        Self { points: points.collect(), ..self.clone() }
     }
 
     /// The corners of a triangle.

@@ -40,7 +40,7 @@ fn the_closest_point_is_the_one_that_trying_every_triangle_finds() {
         let mut triangles: Vec<[u32; 3]> =
             (0..1 + case * 7).map(|_| [corner(&mut dice), corner(&mut dice), corner(&mut dice)]).collect();
         triangles.push([0, 0, 1]);
-        let mesh = Mesh { points, triangles, values: None };
+        let mesh = Mesh { points, triangles, ..Mesh::default() };
         let tree = Nearest::new(&mesh);
         for _ in 0..100 {
             let place = vector(&mut dice) * 2.0;

@@ -1,4 +1,4 @@
-//! PLY: text out, every encoding in.
+//! PLY: binary out (exact, and NaN has a place in it), every encoding in.
 
 use std::fmt::Write as _;
 
@@ -6,32 +6,38 @@ use nalgebra::Vector3;
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{DefaultElement, Property};
 
-use super::{Mesh, SPACE};
+use super::{Mesh, PointScalars, SPACE};
 
 pub(super) fn bytes(mesh: &Mesh) -> Vec<u8> {
-    let mut out = format!("ply\nformat ascii 1.0\ncomment {SPACE}\ncomment probepath lumen, mm\n");
-    let _ = writeln!(out, "element vertex {}", mesh.points.len());
-    out.push_str("property double x\nproperty double y\nproperty double z\n");
-    if let Some((name, _)) = &mesh.values {
-        let _ = writeln!(out, "property double {}", name.replace(char::is_whitespace, "_"));
+    let mut head = format!("ply\nformat binary_little_endian 1.0\ncomment {SPACE}\n");
+    let _ = write!(head, "comment probepath lumen, mm\nelement vertex {}\n", mesh.points.len());
+    head.push_str("property double x\nproperty double y\nproperty double z\n");
+    if !mesh.colours.is_empty() {
+        head.push_str("property uchar red\nproperty uchar green\nproperty uchar blue\n");
     }
-    let _ = write!(
-        out,
-        "element face {}\nproperty list uchar int vertex_indices\nend_header\n",
-        mesh.triangles.len()
-    );
-    for (i, point) in mesh.points.iter().enumerate() {
-        let p = point * 1e3;
-        let _ = write!(out, "{} {} {}", p.x, p.y, p.z);
-        if let Some((_, values)) = &mesh.values {
-            let _ = write!(out, " {}", values.get(i).copied().unwrap_or_default());
-        }
-        out.push('\n');
+    for scalars in &mesh.scalars {
+        let _ = writeln!(head, "property double {}", scalars.name.replace(char::is_whitespace, "_"));
     }
-    for [a, b, c] in &mesh.triangles {
-        let _ = writeln!(out, "3 {a} {b} {c}");
+    let faces = mesh.triangles.len();
+    let _ = write!(head, "element face {faces}\nproperty list uchar int vertex_indices\nend_header\n");
+    let mut out = head.into_bytes();
+    (0..mesh.points.len()).for_each(|i| vertex(&mut out, mesh, i));
+    for triangle in &mesh.triangles {
+        out.push(3);
+        triangle.iter().for_each(|corner| out.extend_from_slice(&corner.to_le_bytes()));
     }
-    out.into_bytes()
+    out
+}
+
+fn vertex(out: &mut Vec<u8>, mesh: &Mesh, i: usize) {
+    let place = mesh.points.get(i).copied().unwrap_or_default() * 1e3;
+    place.iter().for_each(|x| out.extend_from_slice(&x.to_le_bytes()));
+    if !mesh.colours.is_empty() {
+        out.extend_from_slice(&mesh.colours.get(i).copied().unwrap_or_default());
+    }
+    for scalars in &mesh.scalars {
+        out.extend_from_slice(&scalars.values.get(i).copied().unwrap_or(f64::NAN).to_le_bytes());
+    }
 }
 
 pub(super) fn read(bytes: &[u8]) -> Result<Mesh, String> {
@@ -41,9 +47,18 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mesh, String> {
     let vertices = ply.payload.get("vertex").ok_or("it has no vertices")?;
     let faces = ply.payload.get("face").ok_or("it has no faces")?;
     let mut mesh = Mesh::default();
+    let named = vertices.first().map(scalar_names).unwrap_or_default();
+    mesh.scalars = named.into_iter().map(|name| PointScalars { name, values: Vec::new() }).collect();
     for (i, vertex) in vertices.iter().enumerate() {
         let axis = |name: &str| vertex.get(name).and_then(number).ok_or(format!("vertex {i} has no {name}"));
         mesh.points.push(Vector3::new(axis("x")?, axis("y")?, axis("z")?) * 1e-3);
+        for scalars in &mut mesh.scalars {
+            scalars.values.push(vertex.get(&scalars.name).and_then(number).unwrap_or(f64::NAN));
+        }
+        mesh.colours.extend(colour(vertex));
+    }
+    if mesh.colours.len() != mesh.points.len() {
+        mesh.colours.clear();
     }
     for (i, face) in faces.iter().enumerate() {
         let list = face.get("vertex_indices").or_else(|| face.get("vertex_index"));
@@ -54,6 +69,22 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mesh, String> {
         }
     }
     Ok(mesh)
+}
+
+/// What a vertex has beyond its place and colour.
+fn scalar_names(vertex: &DefaultElement) -> Vec<String> {
+    let known = ["x", "y", "z", "red", "green", "blue", "alpha", "nx", "ny", "nz"];
+    let named =
+        vertex.iter().filter(|(name, value)| !known.contains(&name.as_str()) && number(value).is_some());
+    named.map(|(name, _)| name.clone()).collect()
+}
+
+fn colour(vertex: &DefaultElement) -> Option<[u8; 3]> {
+    let channel = |name: &str| match vertex.get(name) {
+        Some(Property::UChar(level)) => Some(*level),
+        _ => None,
+    };
+    Some([channel("red")?, channel("green")?, channel("blue")?])
 }
 
 /// Refuses headers that promise more elements than there are bytes: memory would be asked for before the data is.
@@ -79,6 +110,8 @@ fn number(property: &Property) -> Option<f64> {
         Property::UInt(x) => Some(f64::from(x)),
         Property::Short(x) => Some(f64::from(x)),
         Property::UShort(x) => Some(f64::from(x)),
+        Property::Char(x) => Some(f64::from(x)),
+        Property::UChar(x) => Some(f64::from(x)),
         _ => None,
     }
 }

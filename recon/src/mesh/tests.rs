@@ -41,7 +41,10 @@ fn every_format_gives_back_what_was_written() {
     let folder = std::env::temp_dir().join(format!("probepath-mesh-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder for the test");
     let mut mesh = tube().mesh();
-    mesh.values = Some(("error_mm".into(), (0..mesh.points.len()).map(|i| i as f64 / 7.0).collect()));
+    let count = mesh.points.len();
+    mesh = mesh.with_scalars("area_mm2", (0..count).map(|i| i as f64 / 7.0).collect());
+    mesh = mesh.with_scalars("error_sd_mm", (0..count).map(|i| 0.1 + (i as f64).sin()).collect());
+    mesh.colours = (0..count).map(|i| [i as u8, 255 - i as u8, 7]).collect();
     for name in ["a.stl", "a.ply", "a.VTP"] {
         let path = folder.join(name);
         mesh.write(&path).expect("written");
@@ -55,8 +58,25 @@ fn every_format_gives_back_what_was_written() {
                 assert!((p - q).norm() < 1e-8, "{name}: {p} {q}");
             }
         }
+        if name != "a.stl" {
+            assert_eq!(back.scalars, mesh.scalars, "{name}");
+        }
+        if name == "a.ply" {
+            assert_eq!(back.colours, mesh.colours);
+        }
     }
     std::fs::remove_dir_all(&folder).expect("removed");
+}
+
+#[test]
+fn a_number_that_is_missing_stays_missing_in_every_file_that_keeps_numbers() {
+    let mesh = tube().mesh().with_scalars("area_mm2", vec![1.5]);
+    for (bytes, read) in [(ply::bytes(&mesh), ply::read as Reader), (vtp::bytes(&mesh), vtp::read)] {
+        let back = read(&bytes).expect("read");
+        let values = back.scalars("area_mm2").expect("there");
+        assert!(values.len() == mesh.points.len() && values[1..].iter().all(|value| value.is_nan()));
+        assert!((values[0] - 1.5).abs() < 1e-12);
+    }
 }
 
 #[test]
@@ -87,8 +107,10 @@ fn axes_that_are_not_ours_are_refused() {
     let folder = std::env::temp_dir().join(format!("probepath-ras-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder for the test");
     let path = folder.join("a.ply");
-    let text = String::from_utf8(ply::bytes(&tube().mesh())).expect("text").replace("SPACE=LPS", "SPACE=RAS");
-    std::fs::write(&path, text).expect("written");
+    let mut bytes = ply::bytes(&tube().mesh());
+    let says = bytes.windows(9).position(|word| word == b"SPACE=LPS").expect("its axes");
+    bytes[says + 6..says + 9].copy_from_slice(b"RAS");
+    std::fs::write(&path, bytes).expect("written");
     assert!(matches!(Mesh::read(&path), Err(MeshError::Space { .. })));
     assert!(matches!(Mesh::read(&folder.join("a.obj")), Err(MeshError::Kind { .. })));
     assert!(matches!(Mesh::read(&folder.join("none.stl")), Err(MeshError::File { .. })));

@@ -1,4 +1,4 @@
-//! VTP (VTK's XML): text out; text, and base64 with or without zlib, in.
+//! VTP (VTK's XML): base64 out; text, and base64 with or without zlib, in.
 
 use std::fmt::Write as _;
 use std::io::Read as _;
@@ -8,45 +8,53 @@ use base64::engine::general_purpose::STANDARD;
 use nalgebra::Vector3;
 use roxmltree::{Document, Node};
 
-use super::{MOST, Mesh};
+use super::{MOST, Mesh, PointScalars};
 
 pub(super) fn bytes(mesh: &Mesh) -> Vec<u8> {
     let (points, polygons) = (mesh.points.len(), mesh.triangles.len());
     let mut out = String::from("<?xml version=\"1.0\"?>\n<!-- probepath lumen, mm, SPACE=LPS -->\n");
-    out.push_str("<VTKFile type=\"PolyData\" version=\"0.1\" byte_order=\"LittleEndian\">\n<PolyData>\n");
+    out.push_str(
+        "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<PolyData>\n",
+    );
     // 3D Slicer reads the field.
     out.push_str("<FieldData>\n<DataArray type=\"String\" Name=\"SPACE\" NumberOfTuples=\"1\" format=\"ascii\">76 80 83 0</DataArray>\n</FieldData>\n");
     let _ = writeln!(
         out,
         "<Piece NumberOfPoints=\"{points}\" NumberOfVerts=\"0\" NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"{polygons}\">"
     );
-    if let Some((name, values)) = &mesh.values {
-        let name = name.replace(['&', '<', '"'], "_");
-        let _ = write!(
-            out,
-            "<PointData Scalars=\"{name}\">\n<DataArray type=\"Float64\" Name=\"{name}\" format=\"ascii\">"
-        );
-        (0..points).for_each(|i| {
-            let _ = write!(out, "{} ", values.get(i).copied().unwrap_or_default());
-        });
-        out.push_str("</DataArray>\n</PointData>\n");
-    }
-    out.push_str("<Points>\n<DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">");
-    mesh.points.iter().map(|p| p * 1e3).for_each(|p| {
-        let _ = writeln!(out, "{} {} {}", p.x, p.y, p.z);
-    });
-    out.push_str(
-        "</DataArray>\n</Points>\n<Polys>\n<DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">",
-    );
-    mesh.triangles.iter().for_each(|[a, b, c]| {
-        let _ = writeln!(out, "{a} {b} {c}");
-    });
-    out.push_str("</DataArray>\n<DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">");
-    (1..=polygons).for_each(|i| {
-        let _ = write!(out, "{} ", 3 * i);
-    });
-    out.push_str("</DataArray>\n</Polys>\n</Piece>\n</PolyData>\n</VTKFile>\n");
+    point_data(&mut out, mesh);
+    let places = mesh.points.iter().flat_map(|p| (p * 1e3).iter().copied().collect::<Vec<_>>());
+    out.push_str("<Points>\n");
+    numbers_out(&mut out, "Float64\" NumberOfComponents=\"3", "Points", places.map(f64::to_le_bytes));
+    out.push_str("</Points>\n<Polys>\n");
+    let corners = mesh.triangles.iter().flatten().map(|&corner| i64::from(corner).to_le_bytes());
+    numbers_out(&mut out, "Int64", "connectivity", corners);
+    numbers_out(&mut out, "Int64", "offsets", (1..=polygons as i64).map(|i| (3 * i).to_le_bytes()));
+    out.push_str("</Polys>\n</Piece>\n</PolyData>\n</VTKFile>\n");
     out.into_bytes()
+}
+
+fn point_data(out: &mut String, mesh: &Mesh) {
+    let named = |name: &str| name.replace(['&', '<', '>', '"'], "_");
+    let Some(first) = mesh.scalars.first() else { return };
+    let _ = writeln!(out, "<PointData Scalars=\"{}\">", named(&first.name));
+    for scalars in &mesh.scalars {
+        let value = |i: usize| scalars.values.get(i).copied().unwrap_or(f64::NAN);
+        let values = (0..mesh.points.len()).map(|i| value(i).to_le_bytes());
+        numbers_out(out, "Float64", &named(&scalars.name), values);
+    }
+    out.push_str("</PointData>\n");
+}
+
+/// An array as base64, its length in bytes before it: exact, and NaN passes, which VTK's text reader stops at.
+fn numbers_out(out: &mut String, kind: &str, name: &str, words: impl Iterator<Item = [u8; 8]>) {
+    let mut bytes = vec![0; 8];
+    words.for_each(|word| bytes.extend_from_slice(&word));
+    let length = (bytes.len() as u64 - 8).to_le_bytes();
+    bytes.iter_mut().zip(length).for_each(|(byte, value)| *byte = value);
+    let _ = write!(out, "<DataArray type=\"{kind}\" Name=\"{name}\" format=\"binary\">");
+    STANDARD.encode_string(&bytes, out);
+    out.push_str("</DataArray>\n");
 }
 
 pub(super) fn read(bytes: &[u8]) -> Result<Mesh, String> {
@@ -69,8 +77,30 @@ pub(super) fn read(bytes: &[u8]) -> Result<Mesh, String> {
         let points = array(file, piece, "Points", None)?;
         mesh.points.extend(points.chunks_exact(3).map(|p| Vector3::new(p[0], p[1], p[2]) * 1e-3));
         polygons(file, piece, first, &mut mesh)?;
+        scalars(file, piece, &mut mesh)?;
     }
+    // A number that only some pieces have is none of the mesh.
+    let count = mesh.points.len();
+    mesh.scalars.retain(|scalars| scalars.values.len() == count);
     Ok(mesh)
+}
+
+/// The arrays of one component that belong to the points.
+fn scalars(file: Node<'_, '_>, piece: Node<'_, '_>, mesh: &mut Mesh) -> Result<(), String> {
+    let data = piece.children().filter(|node| node.has_tag_name("PointData"));
+    for node in data.flat_map(arrays) {
+        let single = node.attribute("NumberOfComponents").is_none_or(|count| count == "1");
+        let (Some(name), true, true) = (node.attribute("Name"), single, node.has_tag_name("DataArray"))
+        else {
+            continue;
+        };
+        let values = numbers(file, node).map_err(|why| format!("PointData {name}: {why}"))?;
+        match mesh.scalars.iter_mut().find(|scalars| scalars.name == name) {
+            Some(scalars) => scalars.values.extend(values),
+            None => mesh.scalars.push(PointScalars { name: name.into(), values }),
+        }
+    }
+    Ok(())
 }
 
 fn polygons(file: Node<'_, '_>, piece: Node<'_, '_>, first: u32, mesh: &mut Mesh) -> Result<(), String> {
