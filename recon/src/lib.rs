@@ -45,7 +45,7 @@ mod phantom_images;
 pub use centreline::{Centreline, CentrelinePoint};
 pub use compare::{AreaPair, Closest, CompareError, Comparison, DistanceStatistics, Fit, Nearest, compare};
 pub use error::ReconError;
-pub use lumen::{Contour, ImageLumen, NoLumen, segment};
+pub use lumen::{Contour, ImageLumen, LumenFinder, NoLumen, Tracker, segment};
 pub use mesh::{Mesh, MeshError, PointScalars};
 pub use reconstruct::{
     ImageCounts, LumenReconstruction, ReconWarning, check_sweep, reconstruct_from, reconstruct_lumen,

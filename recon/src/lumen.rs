@@ -2,46 +2,28 @@
 
 mod again;
 mod beam;
+mod contour;
+mod finder;
 mod fit;
 mod refusal;
 mod region;
 mod seed;
 mod track;
 
-use probepath_frames::{Point, World};
 use probepath_us_capture::PlacedBScan;
 use rayon::prelude::*;
 
+pub use contour::Contour;
+pub(crate) use contour::area_and_centre;
+pub use finder::{LumenFinder, Tracker};
 pub use refusal::NoLumen;
 
 use crate::patch::{Patch, PowerOfGrey};
 use crate::settings::FWHM;
 use crate::{LumenSettings, SeedPoint};
+use contour::Uncertainty;
 use fit::{Border, FitInput, Plane};
-use region::Region;
-
-/// The border of the lumen in one image.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Contour {
-    /// Columns and rows of its points, a closed line of equal angles round the centre.
-    pub pixels: Vec<(f64, f64)>,
-    /// Column and row of its centre of gravity.
-    pub centre_pixel: (f64, f64),
-    /// The same points in the World.
-    pub world: Vec<Point<World>>,
-    /// Its centre of gravity in the World.
-    pub centre: Point<World>,
-    /// Area inside it, in the image's plane, which need not be normal to the vessel (mm2).
-    pub area_mm2: f64,
-    /// Standard deviation of its points (mm): what the speckle leaves open, no systematic error.
-    pub sd_mm: f64,
-    /// Whether the dark region runs on beyond it: a branch, or a vein that lies against it.
-    pub branches: bool,
-    /// The wall's thickness (mm).
-    pub wall_mm: f64,
-    /// How much brighter than the lumen the wall is (dB).
-    pub contrast_db: f64,
-}
+use region::{RAYS, Region, angle};
 
 /// What one image gave.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,6 +32,8 @@ pub struct ImageLumen {
     pub number: u64,
     /// The border of the lumen, or why there is none.
     pub lumen: Result<Contour, NoLumen>,
+    /// Further arterial lumens in the same image, such as the deep branch, by rising number of their vessel.
+    pub others: Vec<Contour>,
 }
 
 /// The lumen of every image, in their order. The images are a sweep: each shows the vessel near where the one
@@ -84,7 +68,7 @@ pub fn segment(images: &[PlacedBScan], settings: &LumenSettings) -> Vec<ImageLum
             (Err(why), _) => Err(*why),
             (_, Err(why)) => Err(why),
         };
-        ImageLumen { number: image.bscan.number, lumen }
+        ImageLumen { number: image.bscan.number, lumen, others: Vec::new() }
     })
     .collect()
 }
@@ -145,42 +129,21 @@ impl Look<'_> {
 }
 
 fn contour(image: &PlacedBScan, border: &Border, region: &Region) -> Contour {
-    let points = border.contour();
-    let (area, centre) = area_and_centre(&points);
-    let spacing = image.bscan.setting.spacing;
-    let pixel = |(x, y): (f64, f64)| (x / spacing.x_m, y / spacing.y_m);
-    let world = |(x, y): (f64, f64)| image.world_from_image * Point::new(x, y, 0.0);
-    let own = points.len() as f64;
+    let places = border.contour();
+    let uncertainty = Uncertainty {
+        points_sd_mm: (0..RAYS).map(|ray| border.sd_at(angle(ray)) * 1e3).collect(),
+        sd_mm: border.sd * 1e3,
+        common_sd_mm: border.common_sd * 1e3,
+    };
+    let contour = Contour::of(image, &places, uncertainty);
+    let own = places.len() as f64;
     let filled = region.radii.iter().map(|r| r * r).sum::<f64>() * std::f64::consts::PI / own * region.excess;
     Contour {
-        pixels: points.iter().map(|&point| pixel(point)).collect(),
-        centre_pixel: pixel(centre),
-        world: points.iter().map(|&point| world(point)).collect(),
-        centre: world(centre),
-        area_mm2: area * 1e6,
-        sd_mm: border.sd * 1e3,
-        branches: region.excess > 1.3 || filled > 1.1 * area,
+        branches: region.excess > 1.3 || filled * 1e6 > 1.1 * contour.area_mm2,
         wall_mm: border.wall * 1e3,
         contrast_db: border.contrast_db,
+        ..contour
     }
-}
-
-/// Area and centre of gravity of a closed line (Green's theorem). A line without area has its mean as centre.
-pub(crate) fn area_and_centre(points: &[(f64, f64)]) -> (f64, (f64, f64)) {
-    let n = points.len().max(1) as f64;
-    let mean = points.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / n, sum.1 + p.1 / n));
-    let (mut area, mut x, mut y) = (0.0, 0.0, 0.0);
-    for (a, b) in points.iter().zip(points.iter().cycle().skip(1)) {
-        let (ax, ay, bx, by) = (a.0 - mean.0, a.1 - mean.1, b.0 - mean.0, b.1 - mean.1);
-        let cross = ax * by - bx * ay;
-        area += cross / 2.0;
-        x += (ax + bx) * cross / 6.0;
-        y += (ay + by) * cross / 6.0;
-    }
-    if area.abs() < 1e-30 {
-        return (0.0, mean);
-    }
-    (area.abs(), (mean.0 + x / area, mean.1 + y / area))
 }
 
 impl SeedPoint {

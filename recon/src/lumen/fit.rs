@@ -6,7 +6,7 @@
 //! the standard deviation of exponential speckle is its mean). Nothing is fitted to one model of the wall: its
 //! brightness, how that changes round the vessel, its thickness, the tissue's and the lumen's brightness are unknowns too.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use super::NoLumen;
 use super::region::{RAYS, Region, angle};
@@ -22,6 +22,8 @@ const SLOPE: usize = TISSUE + 1;
 const LUMEN: usize = TISSUE + 2;
 const THICKNESS: usize = TISSUE + 3;
 const UNKNOWNS: usize = TISSUE + 4;
+/// How well the point spread is known, relative to itself; what it is off moves the border by about as much.
+const SPREAD_SD: f64 = 0.1;
 
 /// What the fit is told.
 pub(crate) struct FitInput<'a> {
@@ -64,6 +66,10 @@ pub(crate) struct Border {
     unknowns: DVector<f64>,
     /// Standard deviation of the border's place, mean over the circumference (m).
     pub(crate) sd: f64,
+    /// Covariance of the harmonics (m2).
+    covariance: SMatrix<f64, BORDER, BORDER>,
+    /// Standard deviation of what an error of the point spread does to the mean radius (m).
+    pub(crate) common_sd: f64,
     /// Part of the circumference where a wall is seen (0 to 1).
     pub(crate) walled: f64,
     /// Wall's thickness (m).
@@ -76,6 +82,15 @@ impl Border {
     /// Distance from the centre in a direction (m).
     pub(crate) fn radius(&self, theta: f64) -> f64 {
         basis::<BORDER>(theta).iter().zip(&self.harmonics).map(|(a, b)| a * b).sum()
+    }
+
+    /// Standard deviation of the distance from the centre in a direction (m), along the normal.
+    pub(crate) fn sd_at(&self, theta: f64) -> f64 {
+        let basis = SVector::from(basis::<BORDER>(theta));
+        let (r, slope) = (self.radius(theta), (self.radius(theta + 1e-3) - self.radius(theta - 1e-3)) / 2e-3);
+        // Where the border is not square to the ray, less of a step along the ray is along the normal.
+        let square = r / r.hypot(slope).max(1e-9);
+        (basis.dot(&(self.covariance * basis))).max(0.0).sqrt() * square
     }
 
     /// The closed contour, one place a ray.
@@ -253,6 +268,8 @@ impl<'a> Model<'a> {
             harmonics,
             unknowns: self.unknowns.clone(),
             sd: variance.sqrt(),
+            covariance: covariance.fixed_view::<BORDER, BORDER>(0, 0).into_owned(),
+            common_sd: SPREAD_SD * (self.input.sigma.0 + self.input.sigma.1) / 2.0,
             walled: self.walled(),
             wall: self.unknowns[THICKNESS].exp(),
             contrast_db: wall_db,

@@ -59,6 +59,12 @@ pub enum NoLumen {
         /// How far (mm).
         by_mm: f64,
     },
+    /// A contour that something else found is none.
+    #[error("the contour {what}")]
+    BadContour {
+        /// What is wrong with it.
+        what: &'static str,
+    },
     /// The fit of the wall did not settle.
     #[error("the fit of the wall did not settle")]
     Unsettled,
@@ -76,6 +82,7 @@ impl NoLumen {
             Self::NoWall { .. } => "no wall",
             Self::Radius { .. } => "radius out of range",
             Self::Jump { .. } => "away from its neighbours",
+            Self::BadContour { .. } => "no closed contour",
             Self::Unsettled => "fit did not settle",
         }
     }

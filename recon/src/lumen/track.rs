@@ -38,7 +38,8 @@ pub(crate) fn follow(
     regions
 }
 
-fn region(
+/// The region of an image, where the trail leads or a seed is given.
+pub(crate) fn region(
     image: &PlacedBScan,
     table: &PowerOfGrey,
     settings: &LumenSettings,
