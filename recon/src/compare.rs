@@ -2,14 +2,18 @@
 
 mod closest;
 mod fit;
+mod gold;
+mod sides;
 mod slices;
+mod unroll;
 
 use nalgebra::{Isometry3, Vector3};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 pub use closest::{Closest, Nearest};
+pub use gold::CompareWarning;
+pub use unroll::{Unrolled, unrolled};
 
 use crate::Mesh;
 
@@ -22,6 +26,9 @@ pub enum Fit {
     /// Centre of gravity, then the rigid motion that minimises the distances ([P1] II.C.3).
     #[default]
     Rigid,
+    /// From the same starts, iterated closest points to planes, robust: points that lie far off (a branch that the gold
+    /// standard has not, an end beyond it) count little or nothing, so that they do not pull the rest.
+    Icp,
     /// The rigid motion that minimises the distances, from where both lie: for surfaces already in one system.
     Near,
     /// Not at all: how far is it from where it should be.
@@ -38,6 +45,13 @@ pub struct Comparison {
     pub error_mm: Vec<f64>,
     /// Statistics of the error map.
     pub error: DistanceStatistics,
+    /// The same distances with their signs: negative inside the gold standard, where the surface is too small. Only where
+    /// that is closed, which is what having an inside takes.
+    pub signed_mm: Option<Vec<f64>>,
+    /// Mean of the signed distances (mm).
+    pub bias_mm: Option<f64>,
+    /// What is the matter with the gold standard, or with how both lie.
+    pub warnings: Vec<CompareWarning>,
     /// The way back: distance from the surface of the gold standard's points, those beside the surface (a scan of a part
     /// of the vessel is not blamed for the rest).
     pub gold_error: DistanceStatistics,
@@ -99,25 +113,58 @@ pub enum CompareError {
         /// Which.
         which: &'static str,
     },
+    /// Triangles that are lines or points.
+    #[error("none of the {which}'s triangles has an area: it is no surface")]
+    Flat {
+        /// Which.
+        which: &'static str,
+    },
+    /// One is a thousand times the size of the other.
+    #[error(
+        "the surface is {surface_mm:.3} mm long and the gold standard {gold_mm:.3} mm: the {which} seems to be in metres; surface files \
+         are read as millimetres, so scale it by 1000 first, or say its unit"
+    )]
+    Metres {
+        /// The one in metres.
+        which: &'static str,
+        /// Diagonal of the surface's box (mm).
+        surface_mm: f64,
+        /// Diagonal of the gold standard's (mm).
+        gold_mm: f64,
+    },
+    /// They cannot be of the same vessel.
+    #[error(
+        "the surface is {surface_mm:.3} mm long and the gold standard {gold_mm:.3} mm: they are of different things, or one is in another \
+         unit; both are read as millimetres"
+    )]
+    Sizes {
+        /// Diagonal of the surface's box (mm).
+        surface_mm: f64,
+        /// Diagonal of the gold standard's (mm).
+        gold_mm: f64,
+    },
 }
 
 /// Lays `surface` on `gold` as `fit` says and measures every distance.
 ///
 /// # Errors
-/// When one of them is empty or has numbers that are not finite.
+/// When one of them is empty, has numbers that are not finite, or is in another unit than the other.
 pub fn compare(surface: &Mesh, gold: &Mesh, fit: Fit) -> Result<Comparison, CompareError> {
     check(surface, "surface")?;
     check(gold, "gold standard")?;
-    let on_gold = Nearest::new(gold);
-    let gold_from_surface = fit::rigid(surface, gold, &on_gold, fit);
-    let mut laid = surface.clone();
-    laid.points.iter_mut().for_each(|p| *p = gold_from_surface.transform_point(&(*p).into()).coords);
-    let error_mm = distances_mm(&on_gold, &laid.points);
+    let gold = gold::Gold::of(surface, gold, fit)?;
+    let on_gold = Nearest::new(&gold.mesh);
+    let gold_from_surface = fit::rigid(surface, &gold.mesh, &on_gold, fit);
+    let laid = surface.moved(&gold_from_surface);
+    let closest = on_gold.to_each(&laid.points);
+    let error_mm: Vec<f64> = closest.iter().map(|closest| closest.distance * 1e3).collect();
+    let signed_mm = gold.closed.then(|| signed_mm(&on_gold, &laid.points, &closest));
     let axis = fit::Axis::of(&laid);
-    let beside: Vec<Vector3<f64>> = gold.points.iter().copied().filter(|p| axis.is_beside(p)).collect();
-    let gold_error = statistics(&distances_mm(&Nearest::new(&laid), &beside));
+    let beside: Vec<Vector3<f64>> = gold.mesh.points.iter().copied().filter(|p| axis.is_beside(p)).collect();
+    let back = Nearest::new(&laid).to_each(&beside);
+    let gold_error = statistics(&back.iter().map(|closest| closest.distance * 1e3).collect::<Vec<_>>());
     let error = statistics(&error_mm);
-    let areas = slices::areas(&laid, gold, &axis, SLICES);
+    let areas = slices::areas(&laid, &gold.mesh, &axis, SLICES);
     let relative = areas.iter().map(|pair| 100.0 * (pair.surface_mm2 / pair.gold_mm2 - 1.0));
     let count = areas.len().max(1) as f64;
     Ok(Comparison {
@@ -125,11 +172,24 @@ pub fn compare(surface: &Mesh, gold: &Mesh, fit: Fit) -> Result<Comparison, Comp
         hausdorff_mm: error.max_mm.max(gold_error.max_mm),
         area_error_percent: relative.clone().sum::<f64>() / count,
         area_error_abs_percent: relative.map(f64::abs).sum::<f64>() / count,
+        bias_mm: signed_mm.as_ref().map(|signed| signed.iter().sum::<f64>() / signed.len().max(1) as f64),
+        signed_mm,
+        warnings: gold.warnings,
         error_mm,
         error,
         gold_error,
         areas,
     })
+}
+
+fn has_area(mesh: &Mesh, triangle: &[u32; 3]) -> bool {
+    let [a, b, c] = mesh.corners(triangle);
+    (b - a).cross(&(c - a)).norm() > 0.0
+}
+
+fn signed_mm(gold: &Nearest<'_>, places: &[Vector3<f64>], closest: &[Closest]) -> Vec<f64> {
+    let sides = sides::Sides::of(gold.mesh());
+    places.iter().zip(closest).map(|(place, closest)| sides.signed(gold, place, closest) * 1e3).collect()
 }
 
 fn check(mesh: &Mesh, which: &'static str) -> Result<(), CompareError> {
@@ -139,11 +199,10 @@ fn check(mesh: &Mesh, which: &'static str) -> Result<(), CompareError> {
     }
     let finite = mesh.points.iter().all(|p| p.iter().all(|x| x.is_finite()));
     let named = mesh.triangles.iter().flatten().all(|&k| (k as usize) < points);
+    if finite && named && !mesh.triangles.iter().any(|triangle| has_area(mesh, triangle)) {
+        return Err(CompareError::Flat { which });
+    }
     if finite && named { Ok(()) } else { Err(CompareError::Broken { which }) }
-}
-
-fn distances_mm(nearest: &Nearest<'_>, points: &[Vector3<f64>]) -> Vec<f64> {
-    points.par_iter().map(|p| nearest.to(p).distance * 1e3).collect()
 }
 
 fn statistics(distances: &[f64]) -> DistanceStatistics {

@@ -43,7 +43,10 @@ pub mod volume;
 mod phantom_images;
 
 pub use centreline::{Centreline, CentrelinePoint};
-pub use compare::{AreaPair, Closest, CompareError, Comparison, DistanceStatistics, Fit, Nearest, compare};
+pub use compare::{
+    AreaPair, Closest, CompareError, CompareWarning, Comparison, DistanceStatistics, Fit, Nearest, Unrolled,
+    compare, unrolled,
+};
 pub use error::ReconError;
 pub use lumen::{Contour, ImageLumen, LumenFinder, NoLumen, Tracker, segment};
 pub use mesh::{Mesh, MeshError, PointScalars};
