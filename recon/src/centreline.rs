@@ -1,24 +1,36 @@
-//! The centreline: a C2 curve through the centres of the contours.
+//! The centreline: a C2 curve along the vessel, whatever its bends and whatever the order of the images.
+//!
+//! It is laid through the contours' centres first ([`order`] says which follows which), and then through the centres
+//! of gravity of the sections normal to it: the centre of an oblique cut of a vessel that narrows or bends is not on its
+//! axis.
 
-use nalgebra::{Matrix3, Vector3};
+mod order;
+mod smooth;
+
+use nalgebra::Vector3;
 use probepath_frames::{Direction, Point, World};
 
 use crate::ReconError;
-use crate::spline::{Banded, Knots};
+use crate::spline::Knots;
+use crate::surface::Shape;
+pub(crate) use smooth::add;
 
 /// Distance of the knots (m).
 const KNOT_M: f64 = 3e-3;
-/// Bends of arteries: their curvature (1/m), and the length over which it lasts (m).
-const CURVATURE: f64 = 25.0;
-const BEND_M: f64 = 0.015;
-/// What a contour's centre is off by, neighbours together (m).
-const CENTRE_SD_M: f64 = 0.25e-3;
 /// Distance of the samples kept (m): a chord of a bend of 30 mm radius leaves it by 0.3 um.
 const SAMPLE_M: f64 = 0.25e-3;
 /// The least length that makes a vessel (m).
 const LEAST_M: f64 = 3e-3;
+/// How often the centres are placed along the curve anew and the curve is laid anew.
+const ROUNDS: usize = 3;
+/// A centre farther from the curve than this says nothing about where the curve ends (m).
+const FAR_M: f64 = 3e-3;
+/// Sections are taken this far apart when the curve is laid through their centres of gravity (m).
+const STEP_M: f64 = 0.5e-3;
+/// The nearest of every so many samples is looked for first: 2 mm, within which no artery bends back.
+const STRIDE: usize = 8;
 
-/// A smooth curve along the vessel, from the first contour to the last.
+/// A smooth curve along the vessel, from one end of what was seen to the other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Centreline {
     /// Its points, at most 0.25 mm apart, from the first image's side to the last's.
@@ -41,28 +53,65 @@ pub struct CentrelinePoint {
 }
 
 impl Centreline {
-    /// A smooth curve through `centres`, which may be in any order along the vessel and off by `outlier_m` here and
-    /// there; it runs from the first centre's end to the last's.
+    /// A smooth curve through `centres`, which may lie in any order, unevenly, and here and there off the vessel. It
+    /// begins at the end that the first tenth of them is nearer to.
     ///
     /// # Errors
     /// When the centres span too little.
     pub(crate) fn through(centres: &[Vector3<f64>]) -> Result<Self, ReconError> {
-        let along = main_direction(centres);
-        let places: Vec<f64> = centres.iter().map(|centre| along.dot(centre)).collect();
-        let start = places.iter().copied().fold(f64::INFINITY, f64::min);
-        let end = places.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let mut places = order::places(centres);
+        if begins_at_end(&places) {
+            places.iter_mut().flatten().for_each(|place| *place = -*place);
+        }
+        let (mut placed, mut near): (Vec<Vector3<f64>>, Vec<f64>) =
+            centres.iter().zip(&places).filter_map(|(centre, place)| Some((*centre, (*place)?))).unzip();
+        let mut ends = span(&near);
+        let mut line = None;
+        for _ in 0..ROUNDS {
+            let laid = Self::laid(ends, &near, &placed)?;
+            (placed, near) = placed
+                .iter()
+                .zip(&near)
+                .filter_map(|(c, _)| Some((*c, laid.foot(c, laid.nearest_m(c)?)?)))
+                .unzip();
+            let close: Vec<f64> = placed
+                .iter()
+                .zip(&near)
+                .filter(|(c, at)| laid.distance(c, **at) < FAR_M)
+                .map(|(_, at)| *at)
+                .collect();
+            ends = span(&close);
+            line = Some(laid);
+        }
+        line.ok_or(ReconError::NoFit { what: "centreline" })
+    }
+
+    /// The same curve moved to the centres of gravity of a tube's sections normal to it.
+    pub(crate) fn recentred(&self, shape: &Shape) -> Result<Self, ReconError> {
+        let count = (self.length_m() / STEP_M).ceil().max(4.0) as usize;
+        let places: Vec<f64> = (0..=count).map(|i| self.length_m() * i as f64 / count as f64).collect();
+        let centre = |at: &f64| {
+            let point = self.at(*at)?;
+            let (up, side) = shape.centre_of_gravity(*at);
+            Some(point.point.vector() + point.up.vector() * up + point.side.vector() * side)
+        };
+        let centres: Option<Vec<Vector3<f64>>> = places.iter().map(centre).collect();
+        Self::laid(span(&places), &places, &centres.ok_or(ReconError::NoFit { what: "centreline" })?)
+    }
+
+    /// The smooth curve through centres at known places, between two ends.
+    fn laid((start, end): (f64, f64), places: &[f64], centres: &[Vector3<f64>]) -> Result<Self, ReconError> {
+        let no_fit = || ReconError::NoFit { what: "centreline" };
         if end.is_nan() || end - start < LEAST_M {
             let span_mm = if end > start { (end - start) * 1e3 } else { 0.0 };
             return Err(ReconError::NoLength { span_mm, needed_mm: LEAST_M * 1e3 });
         }
         let knots = Knots::over(start, end, KNOT_M);
-        let coefficients =
-            smooth(&knots, &places, centres).ok_or(ReconError::NoFit { what: "centreline" })?;
+        let coefficients = smooth::smooth(&knots, places, centres).ok_or_else(no_fit)?;
         let curve = |(first, weights): (usize, [f64; 4])| -> Vector3<f64> {
             weights.iter().zip(&coefficients[first..]).map(|(w, c)| c * *w).sum()
         };
-        Self::sampled(start, end, |u| (curve(knots.basis(u)), curve(knots.slope(u))))
-            .ok_or(ReconError::NoFit { what: "centreline" })
+        Self::sampled(start, end, |u| (curve(knots.basis(u)), curve(knots.slope(u)))).ok_or_else(no_fit)
     }
 
     /// Samples of a curve and its derivative.
@@ -91,10 +140,7 @@ impl Centreline {
 
     /// The point at a length from the beginning; beyond an end, straight on.
     pub fn at(&self, at_m: f64) -> Option<CentrelinePoint> {
-        let after =
-            self.points.partition_point(|point| point.at_m < at_m).clamp(1, self.points.len().max(2) - 1);
-        let (a, b) = (self.points.get(after - 1)?, self.points.get(after)?);
-        let t = (at_m - a.at_m) / (b.at_m - a.at_m).max(1e-12);
+        let (a, b, t) = self.between(at_m)?;
         let place = a.point.vector() + (b.point.vector() - a.point.vector()) * t;
         let blend = t.clamp(0.0, 1.0);
         let tangent = Direction::of(a.tangent.vector().lerp(&b.tangent.vector(), blend)).ok()?;
@@ -103,18 +149,50 @@ impl Centreline {
         Some(CentrelinePoint { at_m, point: Point::from_vector(place), tangent, up, side })
     }
 
-    /// The point whose section normal to the curve a place lies in, looked for from `near_m` on.
-    pub(crate) fn section_of(&self, place: &Vector3<f64>, near_m: f64) -> Option<CentrelinePoint> {
-        let mut found = self.at(near_m)?;
+    /// The samples on either side of a length, and how far between them it lies.
+    fn between(&self, at_m: f64) -> Option<(&CentrelinePoint, &CentrelinePoint, f64)> {
+        let last = self.points.len().checked_sub(1).filter(|last| *last > 0)?;
+        // The samples are nearly even: the first guess is one or two off.
+        let guess = at_m / self.length_m().max(1e-12) * last as f64;
+        let mut after = (guess.clamp(0.0, last as f64) as usize + 1).min(last);
+        while after > 1 && self.points[after - 1].at_m > at_m {
+            after -= 1;
+        }
+        while after < last && self.points[after].at_m < at_m {
+            after += 1;
+        }
+        let (a, b) = (&self.points[after - 1], &self.points[after]);
+        Some((a, b, (at_m - a.at_m) / (b.at_m - a.at_m).max(1e-12)))
+    }
+
+    /// The length at which the section normal to the curve holds a place, looked for from `near_m` on (Newton).
+    pub(crate) fn foot(&self, place: &Vector3<f64>, near_m: f64) -> Option<f64> {
+        let mut at = near_m;
         for _ in 0..20 {
-            let along = (place - found.point.vector()).dot(&found.tangent.vector());
-            if along.abs() < 1e-7 {
+            let (a, b, t) = self.between(at)?;
+            let blend = t.clamp(0.0, 1.0);
+            let off = place - a.point.vector() - (b.point.vector() - a.point.vector()) * t;
+            let turned = b.tangent.vector() - a.tangent.vector();
+            let along = off.dot(&(a.tangent.vector() + turned * blend));
+            if along.abs() < 1e-8 {
                 break;
             }
-            // Half steps past a bend's centre would swing; arteries bend more gently than their radius.
-            found = self.at(found.at_m + along.clamp(-5e-3, 5e-3))?;
+            // Toward the inside of a bend sections close up; at its centre they meet.
+            let closing = off.dot(&turned) / (b.at_m - a.at_m).max(1e-12);
+            at += (along / (1.0 - closing).max(0.3)).clamp(-5e-3, 5e-3);
         }
-        Some(found)
+        Some(at)
+    }
+
+    /// The point whose section normal to the curve a place lies in, looked for from `near_m` on.
+    pub(crate) fn section_of(&self, place: &Vector3<f64>, near_m: f64) -> Option<CentrelinePoint> {
+        self.at(self.foot(place, near_m)?)
+    }
+
+    /// How far a place is from the point at a length (m).
+    fn distance(&self, place: &Vector3<f64>, at_m: f64) -> f64 {
+        let point = self.between(at_m).map(|(a, b, t)| a.point.vector().lerp(&b.point.vector(), t));
+        point.map_or(f64::INFINITY, |point| (place - point).norm())
     }
 
     /// Where along the curve the sample nearest to a place lies (m).
@@ -125,8 +203,25 @@ impl Centreline {
     /// The nearest sample to a place.
     pub(crate) fn nearest(&self, place: &Vector3<f64>) -> Option<&CentrelinePoint> {
         let distance = |point: &CentrelinePoint| (point.point.vector() - place).norm_squared();
-        self.points.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        let coarse = self.points.iter().enumerate().step_by(STRIDE);
+        let (near, _) = coarse.min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)))?;
+        let around = near.saturating_sub(STRIDE)..(near + STRIDE + 1).min(self.points.len());
+        self.points[around].iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))
     }
+}
+
+/// Least and largest of some places.
+fn span(places: &[f64]) -> (f64, f64) {
+    places.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| (low.min(*at), high.max(*at)))
+}
+
+/// Whether the first tenth of the places lies beyond the middle of all.
+fn begins_at_end(places: &[Option<f64>]) -> bool {
+    let known: Vec<f64> = places.iter().flatten().copied().collect();
+    let (low, high) = span(&known);
+    let mut first: Vec<f64> = known.iter().take(known.len().div_ceil(10)).copied().collect();
+    first.sort_by(f64::total_cmp);
+    first.get(first.len() / 2).is_some_and(|at| *at > (low + high) / 2.0)
 }
 
 /// The part of a vector normal to a tangent; any normal when there is none.
@@ -138,108 +233,5 @@ fn normal_part(vector: Vector3<f64>, tangent: Vector3<f64>) -> Option<Direction<
     Direction::of(Vector3::x() - tangent * tangent.x).or_else(|_| Direction::of(Vector3::z())).ok()
 }
 
-/// The direction in which the centres extend most, from the first to the last.
-fn main_direction(centres: &[Vector3<f64>]) -> Vector3<f64> {
-    let mean = centres.iter().sum::<Vector3<f64>>() / centres.len().max(1) as f64;
-    let scatter: Matrix3<f64> = centres.iter().map(|c| (c - mean) * (c - mean).transpose()).sum();
-    let eigen = scatter.symmetric_eigen();
-    let along: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
-    // The order of the sweep says which end is the beginning: how place and number go together.
-    let middle = (centres.len() as f64 - 1.0) / 2.0;
-    let rising: f64 =
-        centres.iter().enumerate().map(|(i, c)| (i as f64 - middle) * along.dot(&(c - mean))).sum();
-    if rising < 0.0 { -along } else { along }
-}
-
-/// Coefficients of the smooth curve: least squares that outliers do not pull (Huber), with a penalty on bends.
-fn smooth(knots: &Knots, places: &[f64], centres: &[Vector3<f64>]) -> Option<Vec<Vector3<f64>>> {
-    let mut weights = vec![1.0; centres.len()];
-    let mut coefficients: Vec<Vector3<f64>> = Vec::new();
-    for _ in 0..6 {
-        let size = knots.coefficients();
-        let mut matrix = Banded::new(size, 3);
-        let mut right = vec![Vector3::zeros(); size];
-        for ((place, centre), weight) in places.iter().zip(centres).zip(&weights) {
-            let (first, basis) = knots.basis(*place);
-            let weight = weight / (CENTRE_SD_M * CENTRE_SD_M);
-            add(&mut matrix, first, &basis, weight);
-            basis.iter().zip(&mut right[first..]).for_each(|(b, sum)| *sum += centre * (b * weight));
-        }
-        for (at, weight) in knots.bend_integral() {
-            let (first, bend) = knots.bend(at);
-            add(&mut matrix, first, &bend, weight / (CURVATURE * CURVATURE * BEND_M));
-        }
-        (0..size).for_each(|i| matrix.add(i, i, 1e-3));
-        let factor = matrix.factor()?;
-        let axis = |k: usize| factor.solve(right.iter().map(|v| v[k]).collect());
-        let (x, y, z) = (axis(0), axis(1), axis(2));
-        coefficients = (0..size).map(|i| Vector3::new(x[i], y[i], z[i])).collect();
-        for ((place, centre), weight) in places.iter().zip(centres).zip(&mut weights) {
-            let (first, basis) = knots.basis(*place);
-            let fitted: Vector3<f64> = basis.iter().zip(&coefficients[first..]).map(|(b, c)| c * *b).sum();
-            *weight = (2.0 * CENTRE_SD_M / (fitted - centre).norm().max(1e-9)).min(1.0);
-        }
-    }
-    Some(coefficients)
-}
-
-/// Adds the outer product of a row of four.
-pub(crate) fn add(matrix: &mut Banded, first: usize, row: &[f64; 4], weight: f64) {
-    for (a, left) in row.iter().enumerate() {
-        for (b, right) in row.iter().enumerate().take(a + 1) {
-            matrix.add(first + a, first + b, weight * left * right);
-        }
-    }
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::phantom_images::Dice;
-
-    /// A helix of 40 mm radius that rises 100 mm in a quarter turn.
-    fn helix(t: f64) -> Vector3<f64> {
-        let angle = t * std::f64::consts::FRAC_PI_2;
-        Vector3::new(0.04 * angle.cos(), 0.04 * angle.sin(), 0.1 * t)
-    }
-
-    #[test]
-    fn a_curve_through_noisy_centres_is_near_the_true_one_and_as_long() {
-        let mut dice = Dice(11);
-        for case in 0..20 {
-            let mut centres: Vec<Vector3<f64>> = (0..=200)
-                .map(|i| {
-                    let ((a, b), (c, _)) = (dice.normal_pair(), dice.normal_pair());
-                    helix(f64::from(i) / 200.0) + Vector3::new(a, b, c) * 0.1e-3
-                })
-                .collect();
-            centres[77] += Vector3::new(0.0, 0.02, 0.0);
-            let line = Centreline::through(&centres).expect("long enough");
-            let exact = (0.04_f64 * std::f64::consts::FRAC_PI_2).hypot(0.1);
-            assert!((line.length_m() - exact).abs() < 0.5e-3, "{case}: {} {exact}", line.length_m());
-            for i in 0..=100 {
-                let true_place = helix(f64::from(i) / 100.0);
-                let near = line.nearest(&true_place).expect("not empty");
-                assert!((near.point.vector() - true_place).norm() < 0.25e-3, "{case} {i}");
-            }
-        }
-    }
-
-    #[test]
-    fn a_place_is_in_the_section_normal_to_the_curve() {
-        let centres: Vec<Vector3<f64>> = (0..=200).map(|i| helix(f64::from(i) / 200.0)).collect();
-        let line = Centreline::through(&centres).expect("long enough");
-        let middle = line.at(0.05).expect("inside");
-        let place = middle.point.vector() + middle.up.vector() * 0.004 + middle.side.vector() * 0.003;
-        let found = line.section_of(&place, 0.047).expect("found");
-        assert!((found.at_m - 0.05).abs() < 2e-6, "{}", found.at_m);
-        assert!(middle.up.vector().dot(&middle.tangent.vector()).abs() < 1e-12);
-    }
-
-    #[test]
-    fn centres_in_one_place_have_no_line() {
-        let same = vec![Vector3::new(1.0, 2.0, 3.0); 9];
-        assert!(matches!(Centreline::through(&same), Err(ReconError::NoLength { .. })));
-        assert!(Centreline::through(&[]).is_err());
-    }
-}
+mod tests;

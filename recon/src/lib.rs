@@ -40,6 +40,8 @@ mod vessel;
 pub mod volume;
 
 #[cfg(test)]
+mod phantom_contours;
+#[cfg(test)]
 mod phantom_images;
 
 pub use centreline::{Centreline, CentrelinePoint};

@@ -2,14 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::Vector3;
 use probepath_us_capture::PlacedBScan;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::centreline::Centreline;
 use crate::surface::LumenSurface;
-use crate::vessel::{Place, Vessel};
+use crate::vessel::{Fitted, Vessel};
 use crate::{Contour, ImageLumen, LumenSettings, NoLumen, ReconError, Section, Stenosis, segment};
 
 /// A contour whose centre is farther than this from the smooth centreline is of something else (m).
@@ -71,6 +70,19 @@ pub enum ReconWarning {
         /// Where it ends (mm).
         to_mm: f64,
     },
+    /// Sweeps over the same stretch lie apart.
+    #[error(
+        "two sweeps over {from_mm:.1} to {to_mm:.1} mm lie {by_mm:.1} mm apart: the probe's pose or the leg has moved \
+         between them"
+    )]
+    SweepsDisagree {
+        /// By how much (mm).
+        by_mm: f64,
+        /// Where the stretch begins (mm).
+        from_mm: f64,
+        /// Where it ends (mm).
+        to_mm: f64,
+    },
     /// Many images without a lumen.
     #[error("no lumen was seen in {percent:.0} % of the images")]
     ManyWithout {
@@ -79,7 +91,8 @@ pub enum ReconWarning {
     },
 }
 
-/// Reconstructs the lumen from images along a sweep, each roughly normal to the vessel.
+/// Reconstructs the lumen from images that cut the vessel roughly across: in any order, tilted, repeated, unevenly
+/// spaced. They are looked at in the order of their numbers.
 ///
 /// # Errors
 /// When the settings make no sense, an image has no size or place, or too few images show a lumen.
@@ -88,7 +101,21 @@ pub fn reconstruct_lumen(
     settings: &LumenSettings,
 ) -> Result<LumenReconstruction, ReconError> {
     check_sweep(images, settings)?;
-    reconstruct_from(segment(images, settings), settings)
+    reconstruct_from(segment_by_number(images, settings), settings)
+}
+
+/// The lumen of every image; the images are followed in the order of their numbers, whatever order they come in.
+fn segment_by_number(images: &[PlacedBScan], settings: &LumenSettings) -> Vec<ImageLumen> {
+    if images.is_sorted_by_key(|image| image.bscan.number) {
+        return segment(images, settings);
+    }
+    let mut order: Vec<usize> = (0..images.len()).collect();
+    order.sort_by_key(|&i| images[i].bscan.number);
+    // Pixels are shared, not copied.
+    let sorted: Vec<PlacedBScan> = order.iter().map(|&i| images[i].clone()).collect();
+    let mut found: Vec<(usize, ImageLumen)> = order.into_iter().zip(segment(&sorted, settings)).collect();
+    found.sort_by_key(|(i, _)| *i);
+    found.into_iter().map(|(_, lumen)| lumen).collect()
 }
 
 /// Whether images and settings can be worked with: what every way to a reconstruction asks first.
@@ -109,11 +136,10 @@ pub fn reconstruct_from(
     mut lumens: Vec<ImageLumen>,
     settings: &LumenSettings,
 ) -> Result<LumenReconstruction, ReconError> {
-    let centreline = centreline(&mut lumens)?;
-    let contours: Vec<&Contour> = lumens.iter().filter_map(|image| image.lumen.as_ref().ok()).collect();
-    let (vessel, seen) = Vessel::along(0, centreline, &contours, settings)?;
+    let fitted = fitted(&mut lumens)?;
     let counts = counts(&lumens);
-    let warnings = warnings(&seen, &counts, settings);
+    let warnings = warnings(&fitted, &counts, settings);
+    let vessel = fitted.vessel(0, settings);
     Ok(LumenReconstruction {
         surface: vessel.surface.clone(),
         centreline: vessel.centreline.clone(),
@@ -143,29 +169,47 @@ fn check(image: &PlacedBScan) -> Result<(), ReconError> {
     if image.world_from_image.is_finite() { Ok(()) } else { bad("its pose") }
 }
 
-/// The centreline; contours far from it lose their place.
-fn centreline(lumens: &mut [ImageLumen]) -> Result<Centreline, ReconError> {
+/// The vessel; contours far from its centreline lose their place.
+fn fitted(lumens: &mut [ImageLumen]) -> Result<Fitted, ReconError> {
     loop {
-        let centres: Vec<Vector3<f64>> =
-            lumens.iter().filter_map(|image| Some(image.lumen.as_ref().ok()?.centre.vector())).collect();
-        if centres.len() < LEAST_CONTOURS {
-            return Err(too_few(lumens, centres.len()));
+        let contours = contours(lumens);
+        if contours.len() < LEAST_CONTOURS {
+            return Err(too_few(lumens, contours.len()));
         }
-        let line = Centreline::through(&centres)?;
+        let fitted = Fitted::to(&contours)?;
         let mut refused = false;
         for image in lumens.iter_mut() {
             let Ok(contour) = &image.lumen else { continue };
             let place = contour.centre.vector();
-            let by = line.nearest(&place).map_or(0.0, |near| (near.point.vector() - place).norm());
+            let by =
+                fitted.centreline.nearest(&place).map_or(0.0, |near| (near.point.vector() - place).norm());
             if by > FAR_M {
                 image.lumen = Err(NoLumen::Jump { by_mm: by * 1e3 });
                 refused = true;
             }
         }
         if !refused {
-            return Ok(line);
+            return Ok(fitted);
         }
     }
+}
+
+/// The contours by the numbers of their images; by their places where numbers are the same, so that the order of the
+/// images says nothing.
+fn contours(lumens: &[ImageLumen]) -> Vec<&Contour> {
+    let seen = lumens.iter().filter_map(|image| Some((image.number, image.lumen.as_ref().ok()?)));
+    let mut seen: Vec<(u64, &Contour)> = seen.collect();
+    let key = |contour: &Contour| {
+        let first = contour.world.first().map_or([0.0; 3], |point| point.vector().into());
+        let centre: [f64; 3] = contour.centre.vector().into();
+        centre.into_iter().chain(first)
+    };
+    let by_place = |a: &Contour, b: &Contour| {
+        let pairs = key(a).zip(key(b)).map(|(a, b)| a.total_cmp(&b));
+        pairs.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
+    };
+    seen.sort_by(|a, b| a.0.cmp(&b.0).then_with(|| by_place(a.1, b.1)));
+    seen.into_iter().map(|(_, contour)| contour).collect()
 }
 
 fn too_few(lumens: &[ImageLumen], seen: usize) -> ReconError {
@@ -184,22 +228,10 @@ fn counts(lumens: &[ImageLumen]) -> ImageCounts {
     counts
 }
 
-fn warnings(seen: &[Place], counts: &ImageCounts, settings: &LumenSettings) -> Vec<ReconWarning> {
-    let mut warnings = Vec::new();
+fn warnings(fitted: &Fitted, counts: &ImageCounts, settings: &LumenSettings) -> Vec<ReconWarning> {
     let percent = 100.0 * counts.without_lumen as f64 / counts.images.max(1) as f64;
-    if percent > 10.0 {
-        warnings.push(ReconWarning::ManyWithout { percent });
-    }
-    for pair in seen.windows(2).filter(|pair| pair[1].at_m - pair[0].at_m > settings.longest_gap_m) {
-        warnings.push(ReconWarning::Gap { from_mm: pair[0].at_m * 1e3, to_mm: pair[1].at_m * 1e3 });
-    }
-    // Three in a row: one alone is speckle.
-    for run in seen.chunk_by(|a, b| a.branches == b.branches).filter(|run| run.len() >= 3 && run[0].branches)
-    {
-        let to_mm = run[run.len() - 1].at_m * 1e3;
-        warnings.push(ReconWarning::Branch { from_mm: run[0].at_m * 1e3, to_mm });
-    }
-    warnings
+    let many = (percent > 10.0).then_some(ReconWarning::ManyWithout { percent });
+    many.into_iter().chain(fitted.warnings(settings.longest_gap_m)).collect()
 }
 
 #[cfg(test)]

@@ -5,13 +5,13 @@
 
 mod equations;
 mod samples;
-mod sizes;
+mod trust;
 mod tube;
 
 use probepath_frames::{Point, World};
 
-pub(crate) use samples::samples;
-pub(crate) use tube::{AROUND, Tube};
+pub(crate) use samples::{Samples, coarse_samples, samples};
+pub(crate) use tube::{AROUND, Shape, Tube};
 
 use crate::centreline::{Centreline, CentrelinePoint};
 

@@ -1,11 +1,17 @@
 //! One vessel of the tree: its centreline, its tube, and what is measured on them.
 
+mod sweeps;
+
+use nalgebra::Vector3;
+
 use crate::centreline::Centreline;
-use crate::surface::{self, LumenSurface, Tube};
-use crate::{Contour, LumenSettings, ReconError, Section, Stenosis, section, stenosis};
+use crate::surface::{self, LumenSurface, Samples, Tube};
+use crate::{Contour, LumenSettings, ReconError, ReconWarning, Section, Stenosis, section, stenosis};
 
 /// Sections are this far apart (m).
 const SECTION_STEP_M: f64 = 0.5e-3;
+/// How often the centreline is moved to the middle of what is round it.
+const ROUNDS: usize = 2;
 
 /// The artery that was followed, or a branch of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,40 +39,67 @@ pub(crate) struct Place {
     pub branches: bool,
 }
 
-impl Vessel {
-    /// The vessel along a centreline, and the places of its contours in order.
-    pub(crate) fn along(
-        number: usize,
-        centreline: Centreline,
-        contours: &[&Contour],
-        settings: &LumenSettings,
-    ) -> Result<(Self, Vec<Place>), ReconError> {
-        let tube = Tube::fit(&surface::samples(&centreline, contours))?;
-        let seen = places(&centreline, contours);
+/// A centreline and the tube round it, before anything is measured.
+pub(crate) struct Fitted {
+    pub centreline: Centreline,
+    pub tube: Tube,
+    /// The contours as seen from the centreline, sorted along it.
+    pub samples: Vec<Samples>,
+    /// Where they lie, sorted.
+    pub seen: Vec<Place>,
+}
+
+impl Fitted {
+    /// From contours in the order of their images.
+    pub(crate) fn to(contours: &[&Contour]) -> Result<Self, ReconError> {
+        let centres: Vec<Vector3<f64>> = contours.iter().map(|contour| contour.centre.vector()).collect();
+        let mut centreline = Centreline::through(&centres)?;
+        for _ in 0..ROUNDS {
+            let shape = Tube::shape_of(&surface::coarse_samples(&centreline, contours))?;
+            centreline = centreline.recentred(&shape)?;
+        }
+        let samples = surface::samples(&centreline, contours);
+        let tube = Tube::fit(&samples)?;
+        let place = |s: &Samples| Place { at_m: s.at, branches: contours[s.turn].branches };
+        let seen = samples.iter().map(place).collect();
+        Ok(Self { centreline, tube, samples, seen })
+    }
+
+    /// What has to be said about gaps, branches and sweeps that disagree.
+    pub(crate) fn warnings(&self, longest_gap_m: f64) -> Vec<ReconWarning> {
+        let pairs = self.seen.windows(2).filter(|pair| pair[1].at_m - pair[0].at_m > longest_gap_m);
+        let gap =
+            |pair: &[Place]| ReconWarning::Gap { from_mm: pair[0].at_m * 1e3, to_mm: pair[1].at_m * 1e3 };
+        // Three in a row: one alone is speckle.
+        let runs = self.seen.chunk_by(|a, b| a.branches == b.branches);
+        let runs = runs.filter(|run| run.len() >= 3 && run[0].branches);
+        let branch = |run: &[Place]| ReconWarning::Branch {
+            from_mm: run[0].at_m * 1e3,
+            to_mm: run[run.len() - 1].at_m * 1e3,
+        };
+        let disagreement = sweeps::disagreement(&self.centreline, &self.tube, &self.samples);
+        pairs.map(gap).chain(runs.map(branch)).chain(disagreement).collect()
+    }
+
+    /// The vessel with its grid and measures.
+    pub(crate) fn vessel(self, number: usize, settings: &LumenSettings) -> Vessel {
+        let Self { centreline, tube, seen, .. } = self;
         let measured = |at: f64| is_measured(&seen, at, settings.longest_gap_m);
         let surface = surface::grid(&centreline, &tube, settings.grid, measured);
         let sections = section::sections(&centreline, &tube, SECTION_STEP_M, measured);
         let stenoses = stenosis::find(&sections, settings.least_percent_area);
-        Ok((Self { number, centreline, surface, sections, stenoses, tube }, seen))
+        Vessel { number, centreline, surface, sections, stenoses, tube }
     }
 }
 
-/// Where along the centreline contours lie, in order, and whether they branch.
-fn places(line: &Centreline, contours: &[&Contour]) -> Vec<Place> {
-    let place = |contour: &&Contour| {
-        let at_m = line.nearest_m(&contour.centre.vector())?;
-        Some(Place { at_m, branches: contour.branches })
-    };
-    let mut places: Vec<Place> = contours.iter().filter_map(place).collect();
-    places.sort_by(|a, b| a.at_m.total_cmp(&b.at_m));
-    places
-}
-
 /// Whether contours lie on both sides of a place, no farther apart than the longest gap.
-fn is_measured(seen: &[Place], at: f64, longest_gap: f64) -> bool {
+pub(crate) fn is_measured(seen: &[Place], at: f64, longest_gap: f64) -> bool {
     let after = seen.partition_point(|place| place.at_m < at);
     let next = seen.get(after).map_or(f64::INFINITY, |place| place.at_m - at);
     let last = after.checked_sub(1).and_then(|i| seen.get(i)).map_or(f64::INFINITY, |place| at - place.at_m);
     // At the ends a contour within half a gap will do.
     next + last <= longest_gap || next.min(last) <= 0.25 * longest_gap
 }
+
+#[cfg(test)]
+mod tests;

@@ -131,8 +131,13 @@ mod tests {
             let (at, r, weight) = (dice.uniform() * 11.0 - 1.0, dice.uniform(), dice.uniform());
             Sample { at, turn: (angle.cos(), angle.sin()), r, weight }
         };
-        let contour =
-            Samples { at: 0.0, radius: 1.0, own_sd: 1.0, points: (0..400).map(|_| sample()).collect() };
+        let contour = Samples {
+            at: 0.0,
+            means: [1.0, 0.0, 0.0],
+            own_sd: 1.0,
+            turn: 0,
+            points: (0..400).map(|_| sample()).collect(),
+        };
         let (ours, right) = normal(&knots, std::slice::from_ref(&contour), &[0.7]);
         let size = knots.coefficients() * AROUND;
         let (mut plain, mut plain_right) = (Banded::new(size, SPAN), vec![0.0; size]);

@@ -1,26 +1,30 @@
 //! Contour points as the tube sees them: length along the centreline, direction around it, distance from it.
 
 use nalgebra::Vector3;
-
-use crate::Contour;
-use crate::centreline::Centreline;
+use probepath_frames::{Point, World};
 
 use super::AROUND;
+use crate::Contour;
+use crate::centreline::Centreline;
 
 /// What a pose adds to a contour's uncertainty (m).
 const POSE_SD_M: f64 = 0.1e-3;
 /// Images within half of this on either side see the same speckle (m): the beam's thickness.
 const SAME_SPECKLE_M: f64 = 2.5e-3;
+/// Points of a contour that a first, coarse look needs.
+const COARSE: usize = 24;
 
 /// The points of one contour.
 #[derive(Clone, Debug)]
 pub(crate) struct Samples {
     /// Where the contour lies along the centreline: the mean of its points (m).
     pub at: f64,
-    /// Mean distance of its points from the centreline (m).
-    pub radius: f64,
+    /// Means over its points: distance from the centreline, and place across the vessel along `up` and `side` (m).
+    pub means: [f64; 3],
     /// Standard deviation of its size (m).
     pub own_sd: f64,
+    /// Its place among the contours, in the order of their images.
+    pub turn: usize,
     /// Its points.
     pub points: Vec<Sample>,
 }
@@ -41,7 +45,18 @@ pub(crate) struct Sample {
 
 /// The contours as seen from the centreline, in the order of their places along it.
 pub(crate) fn samples(line: &Centreline, contours: &[&Contour]) -> Vec<Samples> {
-    let mut all: Vec<Samples> = contours.iter().filter_map(|contour| of(line, contour)).collect();
+    sampled(line, contours, |_| 1)
+}
+
+/// The same from fewer points of each contour, for a first look.
+pub(crate) fn coarse_samples(line: &Centreline, contours: &[&Contour]) -> Vec<Samples> {
+    sampled(line, contours, |points| (points / COARSE).max(1))
+}
+
+fn sampled(line: &Centreline, contours: &[&Contour], step: impl Fn(usize) -> usize) -> Vec<Samples> {
+    let each = contours.iter().enumerate();
+    let mut all: Vec<Samples> =
+        each.filter_map(|(turn, contour)| of(line, contour, turn, step(contour.world.len()))).collect();
     all.sort_by(|a, b| a.at.total_cmp(&b.at));
     let places: Vec<f64> = all.iter().map(|samples| samples.at).collect();
     for samples in &mut all {
@@ -53,24 +68,38 @@ pub(crate) fn samples(line: &Centreline, contours: &[&Contour]) -> Vec<Samples> 
 }
 
 /// One contour's points, each counting as if no other image had seen the same speckle.
-fn of(line: &Centreline, contour: &Contour) -> Option<Samples> {
+fn of(line: &Centreline, contour: &Contour, turn: usize, step: usize) -> Option<Samples> {
     let own_sd = (contour.sd_mm * 1e-3).hypot(POSE_SD_M);
-    let count = contour.world.len();
-    // A contour has eleven free numbers, however many points draw it.
-    let weight = AROUND as f64 / (count as f64 * own_sd * own_sd);
     let mut near = line.nearest_m(&contour.centre.vector())?;
-    let mut points = Vec::with_capacity(count);
-    for place in &contour.world {
-        let place: Vector3<f64> = place.vector();
-        let section = line.section_of(&place, near)?;
-        near = section.at_m;
-        let off = place - section.point.vector();
-        let (x, y) = (off.dot(&section.up.vector()), off.dot(&section.side.vector()));
-        let r = x.hypot(y);
-        let turn = if r > 0.0 { (x / r, y / r) } else { (1.0, 0.0) };
-        points.push(Sample { at: section.at_m, turn, r, weight });
+    let mut points = Vec::with_capacity(contour.world.len() / step + 1);
+    let mut sums = [0.0; 4];
+    for (k, place) in contour.world.iter().enumerate().step_by(step) {
+        let (sample, across) = sample(line, place, near, sd(contour, k))?;
+        near = sample.at;
+        let values = [sample.r, across.0, across.1, sample.at];
+        sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+        points.push(sample);
     }
-    let mean = |value: fn(&Sample) -> f64| points.iter().map(value).sum::<f64>() / count as f64;
-    Some(Samples { at: mean(|p| p.at), radius: mean(|p| p.r), own_sd, points })
-        .filter(|samples| samples.at.is_finite() && samples.radius.is_finite())
+    let count = points.len() as f64;
+    // A contour has eleven free numbers, however many points draw it.
+    points.iter_mut().for_each(|point| point.weight *= (AROUND as f64 / count).min(1.0));
+    let [r, up, side, at] = sums.map(|sum| sum / count);
+    Some(Samples { at, means: [r, up, side], own_sd, turn, points })
+        .filter(|samples| samples.at.is_finite() && r.is_finite() && own_sd.is_finite())
+}
+
+/// Standard deviation of a contour's point, the pose's in it (m).
+fn sd(contour: &Contour, _k: usize) -> f64 {
+    (contour.sd_mm * 1e-3).hypot(POSE_SD_M)
+}
+
+/// A point, and its place across the vessel.
+fn sample(line: &Centreline, place: &Point<World>, near: f64, sd: f64) -> Option<(Sample, (f64, f64))> {
+    let place: Vector3<f64> = place.vector();
+    let section = line.section_of(&place, near)?;
+    let off = place - section.point.vector();
+    let across = (off.dot(&section.up.vector()), off.dot(&section.side.vector()));
+    let r = across.0.hypot(across.1);
+    let turn = if r > 0.0 { (across.0 / r, across.1 / r) } else { (1.0, 0.0) };
+    Some((Sample { at: section.at_m, turn, r, weight: 1.0 / (sd * sd) }, across))
 }

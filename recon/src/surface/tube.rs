@@ -5,10 +5,10 @@ use probepath_frames::{Point, World};
 
 use super::equations;
 use super::samples::Samples;
-use super::sizes;
+use super::trust;
 use crate::ReconError;
 use crate::centreline::CentrelinePoint;
-use crate::spline::{Banded, InBand, Knots};
+use crate::spline::{Banded, Factor, InBand, Knots};
 
 /// Harmonics around.
 pub(crate) const HARMONICS: usize = 5;
@@ -21,40 +21,29 @@ const KNOT_M: f64 = 2e-3;
 /// How sharply radii bend along the vessel (1/m), and over which length (m).
 pub(super) const BEND: f64 = 80.0;
 pub(super) const BEND_M: f64 = 5e-3;
+/// No leg's artery is longer (m): what is has been put together from poses that jump.
+const LONGEST_M: f64 = 3.0;
 /// No lumen is drawn narrower (m).
 const LEAST_RADIUS_M: f64 = 0.05e-3;
 
+/// Angles at which a section's centre of gravity is summed: exact for products of four times five harmonics.
+const ANGLES: usize = 24;
+
 /// The distance of the border from the centreline, as a function of length and angle.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Tube {
+pub(crate) struct Shape {
     knots: Knots,
     coefficients: Vec<f64>,
+}
+
+/// A shape that knows how sure it is.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Tube {
+    shape: Shape,
     covariance: InBand,
 }
 
-impl Tube {
-    /// Fitted to contours that are sorted by their places.
-    pub(crate) fn fit(contours: &[Samples]) -> Result<Self, ReconError> {
-        let no_fit = || ReconError::NoFit { what: "lumen surface" };
-        let places = || contours.iter().flat_map(|contour| &contour.points).map(|point| point.at);
-        let (start, end) =
-            places().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), at| (a.min(at), b.max(at)));
-        if end.is_nan() || end <= start {
-            return Err(no_fit());
-        }
-        let knots = Knots::over(start, end, KNOT_M);
-        let trust = sizes::trust(&knots, contours).ok_or_else(no_fit)?;
-        Self::solve(&knots, contours, &trust).ok_or_else(no_fit)
-    }
-
-    fn solve(knots: &Knots, contours: &[Samples], trust: &[f64]) -> Option<Self> {
-        let (mut matrix, right) = equations::normal(knots, contours, trust);
-        stiffen(&mut matrix, knots);
-        let factor = matrix.factor()?;
-        let covariance = factor.inverse_in_band();
-        Some(Self { knots: *knots, coefficients: factor.solve(right), covariance })
-    }
-
+impl Shape {
     /// The harmonics of the section at a length (m): mean radius, then cosine and sine of once round, twice, ...
     pub(crate) fn section(&self, at: f64) -> [f64; AROUND] {
         let (first, along) = self.knots.basis(at);
@@ -66,9 +55,57 @@ impl Tube {
         section
     }
 
+    /// Distance from the centreline at a length, in the direction of a cosine and sine (m).
+    pub(crate) fn radius(&self, at: f64, turn: (f64, f64)) -> f64 {
+        radius(&self.section(at), turn)
+    }
+
+    /// The centre of gravity of the section at a length, along its `up` and `side` (m).
+    pub(crate) fn centre_of_gravity(&self, at: f64) -> (f64, f64) {
+        let section = self.section(at);
+        let (mut area, mut up, mut side) = (0.0, 0.0, 0.0);
+        for k in 0..ANGLES {
+            let (sin, cos) = (std::f64::consts::TAU * k as f64 / ANGLES as f64).sin_cos();
+            let r = radius(&section, (cos, sin));
+            area += r * r / 2.0;
+            up += r * r * r * cos / 3.0;
+            side += r * r * r * sin / 3.0;
+        }
+        if area > 0.0 { (up / area, side / area) } else { (0.0, 0.0) }
+    }
+}
+
+/// The distance in one direction (m).
+fn radius(section: &[f64; AROUND], turn: (f64, f64)) -> f64 {
+    let sum: f64 = section.iter().zip(harmonics_of(turn)).map(|(a, b)| a * b).sum();
+    sum.max(LEAST_RADIUS_M)
+}
+
+impl Tube {
+    /// Fitted to contours that are sorted by their places.
+    pub(crate) fn fit(contours: &[Samples]) -> Result<Self, ReconError> {
+        let (shape, factor) = solve(contours).ok_or(NO_FIT)?;
+        Ok(Self { shape, covariance: factor.inverse_in_band() })
+    }
+
+    /// The same without the covariance.
+    pub(crate) fn shape_of(contours: &[Samples]) -> Result<Shape, ReconError> {
+        Ok(solve(contours).ok_or(NO_FIT)?.0)
+    }
+
+    /// Its shape.
+    pub(crate) const fn shape(&self) -> &Shape {
+        &self.shape
+    }
+
+    /// The harmonics of the section at a length (m): mean radius, then cosine and sine of once round, twice, ...
+    pub(crate) fn section(&self, at: f64) -> [f64; AROUND] {
+        self.shape.section(at)
+    }
+
     /// Covariance of these harmonics (m2): what speckle and single poses leave open, nothing that all images share.
     pub(crate) fn covariance(&self, at: f64) -> SMatrix<f64, AROUND, AROUND> {
-        let (first, along) = self.knots.basis(at);
+        let (first, along) = self.shape.knots.basis(at);
         let mut sum = SMatrix::zeros();
         for (a, left) in along.iter().enumerate() {
             for (b, right) in along.iter().enumerate() {
@@ -89,27 +126,38 @@ impl Tube {
 
     /// Distance from the centreline at a length and an angle (m).
     pub(crate) fn radius(&self, at: f64, angle: f64) -> f64 {
-        self.section(at).iter().zip(harmonics(angle)).map(|(a, b)| a * b).sum()
+        self.shape.radius(at, (angle.cos(), angle.sin()))
     }
 
     /// The points of the surface round a point of the centreline, at angles given by sine and cosine.
     pub(crate) fn ring(&self, centre: &CentrelinePoint, angles: &[(f64, f64)]) -> Vec<Point<World>> {
         let section = self.section(centre.at_m);
         let point = |&(sin, cos): &(f64, f64)| {
-            let r: f64 = section.iter().zip(harmonics_of((cos, sin))).map(|(a, b)| a * b).sum();
-            let r = r.max(LEAST_RADIUS_M);
+            let r = radius(&section, (cos, sin));
             centre.point.moved(centre.up, r * cos).moved(centre.side, r * sin)
         };
         angles.iter().map(point).collect()
     }
 }
 
-/// One, then cosine and sine of once, twice, ... an angle.
-pub(crate) fn harmonics(angle: f64) -> [f64; AROUND] {
-    harmonics_of((angle.cos(), angle.sin()))
+const NO_FIT: ReconError = ReconError::NoFit { what: "lumen surface" };
+
+fn solve(contours: &[Samples]) -> Option<(Shape, Factor)> {
+    let places = contours.iter().flat_map(|contour| &contour.points).map(|point| point.at);
+    let (start, end) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), at| (a.min(at), b.max(at)));
+    if !(end > start && end - start < LONGEST_M) {
+        return None;
+    }
+    let knots = Knots::over(start, end, KNOT_M);
+    let trust = trust::of(&knots, contours)?;
+    let (mut matrix, right) = equations::normal(&knots, contours, &trust);
+    stiffen(&mut matrix, &knots);
+    let factor = matrix.factor()?;
+    let coefficients = factor.solve(right);
+    Some((Shape { knots, coefficients }, factor))
 }
 
-/// The same from the angle's cosine and sine.
+/// One, then cosine and sine of once, twice, ... an angle, from its cosine and sine.
 pub(crate) fn harmonics_of((cos, sin): (f64, f64)) -> [f64; AROUND] {
     let mut all = [1.0; AROUND];
     let mut turn = (1.0, 0.0);

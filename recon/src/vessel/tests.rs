@@ -1,0 +1,137 @@
+use nalgebra::Vector3;
+
+use super::*;
+use crate::phantom_contours::{BentVessel, Cut, numbered, shuffled};
+use crate::phantom_images::Dice;
+use crate::{ImageLumen, reconstruct_from};
+
+/// Cuts along the whole vessel, unevenly spaced and tilted by up to 30 degrees, in an order of chance.
+fn cuts(vessel: &BentVessel, spacing: f64, dice: &mut Dice) -> Vec<Cut> {
+    let mut cuts = Vec::new();
+    let mut at = 0.0;
+    while at < vessel.length {
+        let (tilt, way) = (0.52 * dice.uniform(), 6.3 * dice.uniform());
+        cuts.push(Cut { at, tilt, way, off: Vector3::zeros() });
+        at += spacing * (0.2 + 1.6 * dice.uniform());
+    }
+    shuffled(cuts.len(), dice).into_iter().map(|i| cuts[i]).collect()
+}
+
+/// A cut across the vessel.
+fn straight(at: f64) -> Cut {
+    Cut { at, tilt: 0.0, way: 0.0, off: Vector3::zeros() }
+}
+
+fn exact(vessel: &BentVessel, cuts: &[Cut]) -> Vec<Contour> {
+    cuts.iter().map(|cut| vessel.contour(*cut, 32, |_| 0.0)).collect()
+}
+
+fn fitted(contours: &[Contour]) -> Result<Fitted, ReconError> {
+    Fitted::to(&contours.iter().collect::<Vec<_>>())
+}
+
+/// Distances of the centreline's points from the true axis, 2 mm at either end left out (m).
+fn off_axis(line: &Centreline, vessel: &BentVessel) -> Vec<f64> {
+    let inner = line.points.iter().filter(|p| p.at_m > 2e-3 && p.at_m < line.length_m() - 2e-3);
+    let near = |place: &Vector3<f64>| {
+        let steps = 0..(vessel.length / 2e-3) as usize;
+        let distance = |i: &usize| (vessel.axis(*i as f64 * 2e-3) - place).norm();
+        steps.min_by(|a, b| distance(a).total_cmp(&distance(b))).map_or(0.0, |i| i as f64 * 2e-3)
+    };
+    inner.map(|p| vessel.seen_from(&p.point.vector(), near(&p.point.vector())).1).collect()
+}
+
+#[test]
+fn the_axis_of_vessels_bent_at_random_is_found_from_oblique_uneven_cuts_in_any_order() {
+    let mut dice = Dice(21);
+    let mut worst: f64 = 0.0;
+    for case in 0..200 {
+        let turn = 2.4 * dice.uniform();
+        let mut vessel =
+            BentVessel::new(0.06 + 0.06 * dice.uniform(), 2e-3 + 2e-3 * dice.uniform(), turn, &mut dice);
+        vessel.stenoses.push((0.03, 0.012 + 0.008 * dice.uniform(), 0.8 * dice.uniform()));
+        let cuts = cuts(&vessel, 0.8e-3, &mut dice);
+        let found = fitted(&exact(&vessel, &cuts)).expect("a vessel");
+        let off = off_axis(&found.centreline, &vessel);
+        let largest = off.iter().copied().fold(0.0, f64::max);
+        worst = worst.max(largest);
+        assert!(largest < 0.05e-3, "{case}: {:.4} mm, turn {turn}", largest * 1e3);
+        assert!((found.centreline.length_m() - vessel.length).abs() < 2e-3, "{case}");
+    }
+    eprintln!("worst {:.4} mm", worst * 1e3);
+}
+
+#[test]
+fn the_order_of_the_images_changes_nothing() {
+    let mut dice = Dice(22);
+    for _ in 0..20 {
+        let vessel = BentVessel::new(0.08, 3.5e-3, 2.0 * dice.uniform(), &mut dice);
+        let cuts = cuts(&vessel, 1.0e-3, &mut dice);
+        let noisy = cuts.iter().map(|cut| vessel.contour(*cut, 32, |_| 0.1e-3 * dice.normal_pair().0));
+        let lumens: Vec<ImageLumen> = numbered(noisy.collect::<Vec<_>>());
+        let settings = LumenSettings::default();
+        let once = reconstruct_from(lumens.clone(), &settings).expect("a vessel");
+        let mixed = shuffled(lumens.len(), &mut dice).into_iter().map(|i| lumens[i].clone()).collect();
+        let again = reconstruct_from(mixed, &settings).expect("a vessel");
+        assert_eq!(once.vessels, again.vessels);
+        assert_eq!(once.warnings, again.warnings);
+    }
+}
+
+#[test]
+fn there_and_back_is_one_vessel_from_where_the_sweep_began() {
+    let vessel = BentVessel::new(0.09, 3.5e-3, 1.8, &mut Dice(4));
+    let there = (0..=60).map(|i| f64::from(i) * 1.5e-3);
+    let cuts: Vec<Cut> = there.clone().chain(there.rev().map(|at| at - 0.4e-3)).map(straight).collect();
+    let found = fitted(&exact(&vessel, &cuts)).expect("a vessel");
+    assert!((found.centreline.length_m() - 0.09).abs() < 1e-3, "{}", found.centreline.length_m());
+    assert!((found.centreline.points[0].point.vector() - vessel.axis(0.0)).norm() < 1e-3);
+    assert!(found.warnings(4e-3).is_empty(), "{:?}", found.warnings(4e-3));
+}
+
+#[test]
+fn sweeps_that_lie_apart_are_told_and_those_that_do_not_are_not() {
+    let mut dice = Dice(5);
+    for case in 0..20 {
+        let vessel = BentVessel::new(0.08, 3.5e-3, 1.5 * dice.uniform(), &mut dice);
+        let off = Vector3::new(dice.uniform() - 0.5, dice.uniform() - 0.5, dice.uniform() - 0.5);
+        let off = off.normalize() * if case % 2 == 0 { 1.2e-3 } else { 0.2e-3 };
+        let sweep =
+            |from: f64, off| (0..50).map(move |i| Cut { off, ..straight(from + f64::from(i) * 1e-3) });
+        let cuts: Vec<Cut> = sweep(0.0, Vector3::zeros()).chain(sweep(0.02, off)).collect();
+        let noisy = cuts.iter().map(|cut| vessel.contour(*cut, 32, |_| 0.1e-3 * dice.normal_pair().0));
+        let found = fitted(&noisy.collect::<Vec<_>>()).expect("a vessel");
+        let told = found.warnings(4e-3).iter().find_map(|warning| match warning {
+            ReconWarning::SweepsDisagree { by_mm, from_mm, to_mm } => Some((*by_mm, *from_mm, *to_mm)),
+            _ => None,
+        });
+        // What lies along the vessel cannot be seen.
+        let across = (0..=25).map(|i| {
+            let at = 0.025 + f64::from(i) * 1e-3;
+            let along = (vessel.axis(at + 1e-3) - vessel.axis(at - 1e-3)).normalize();
+            (off - along * off.dot(&along)).norm() * 1e3
+        });
+        let across = across.sum::<f64>() / 26.0;
+        match told {
+            Some((by, from, to)) => {
+                assert!(across > 0.4 && (by - off.norm() * 1e3).abs() < 0.6, "{case}: {by} of {across}");
+                assert!((from - 20.0).abs() < 3.0 && (to - 50.0).abs() < 3.0, "{case}: {from} to {to}");
+            }
+            None => assert!(across < 0.8, "{case}: {across}"),
+        }
+    }
+}
+
+#[test]
+fn contours_whose_pose_jumped_do_not_bend_the_vessel() {
+    let vessel = BentVessel::new(0.08, 3.5e-3, 1.2, &mut Dice(6));
+    let mut cuts: Vec<Cut> = (0..=100).map(|i| straight(f64::from(i) * 0.8e-3)).collect();
+    cuts[30].off = Vector3::new(0.0, 0.02, 0.01);
+    cuts[31].off = Vector3::new(0.0, 0.02, 0.01);
+    cuts[60].off = Vector3::new(1.5e-3, 0.0, 1.0e-3);
+    let lumens = numbered(exact(&vessel, &cuts));
+    let found = reconstruct_from(lumens, &LumenSettings::default()).expect("a vessel");
+    assert_eq!(found.counts.without_lumen, 2, "{:?}", found.counts);
+    let off = off_axis(&found.centreline, &vessel);
+    assert!(off.iter().copied().fold(0.0, f64::max) < 0.2e-3);
+}
