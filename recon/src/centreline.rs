@@ -99,6 +99,18 @@ impl Centreline {
         Self::laid(span(&places), &places, &centres.ok_or(ReconError::NoFit { what: "centreline" })?)
     }
 
+    /// The same curve from its end to its beginning.
+    #[must_use]
+    pub(crate) fn reversed(&self) -> Self {
+        let turned = |p: &CentrelinePoint| CentrelinePoint {
+            at_m: self.length_m() - p.at_m,
+            tangent: p.tangent.reversed(),
+            side: p.side.reversed(),
+            ..*p
+        };
+        Self { points: self.points.iter().rev().map(turned).collect() }
+    }
+
     /// The smooth curve through centres at known places, between two ends.
     fn laid((start, end): (f64, f64), places: &[f64], centres: &[Vector3<f64>]) -> Result<Self, ReconError> {
         let no_fit = || ReconError::NoFit { what: "centreline" };
@@ -225,7 +237,7 @@ fn begins_at_end(places: &[Option<f64>]) -> bool {
 }
 
 /// The part of a vector normal to a tangent; any normal when there is none.
-fn normal_part(vector: Vector3<f64>, tangent: Vector3<f64>) -> Option<Direction<World>> {
+pub(crate) fn normal_part(vector: Vector3<f64>, tangent: Vector3<f64>) -> Option<Direction<World>> {
     let part = vector - tangent * tangent.dot(&vector);
     if part.norm() > 0.2 {
         return Direction::of(part).ok();

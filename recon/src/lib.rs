@@ -59,4 +59,4 @@ pub use section::{Section, SectionMeasure};
 pub use settings::{LumenSettings, PointSpread, SeedPoint};
 pub use stenosis::{Reference, ReferenceSide, Stenosis};
 pub use surface::LumenSurface;
-pub use vessel::Vessel;
+pub use vessel::{Leaves, Vessel};

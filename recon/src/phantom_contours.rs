@@ -60,6 +60,13 @@ impl BentVessel {
         vessel
     }
 
+    /// A straight one, from a place in a direction.
+    pub fn straight(length: f64, radius: f64, from: Vector3<f64>, way: Vector3<f64>) -> Self {
+        let count = (length / STEP_M).round() as usize;
+        let places = (0..=count).map(|i| from + way * (i as f64 * STEP_M)).collect();
+        Self { length, radius, stenoses: Vec::new(), places, tangents: vec![way; count + 1] }
+    }
+
     /// Where the axis is at a length.
     pub fn axis(&self, at: f64) -> Vector3<f64> {
         self.sample(at).0
@@ -120,7 +127,10 @@ impl BentVessel {
             world: places.iter().map(|&place| world(place)).collect(),
             centre: world(centre),
             area_mm2: area * 1e6,
-            sd_mm: 0.05,
+            sd_mm: 0.03,
+            points_sd_mm: vec![0.1; places.len()],
+            common_sd_mm: 0.05,
+            vessel: 0,
             branches: false,
             wall_mm: 0.8,
             contrast_db: 20.0,
@@ -141,7 +151,11 @@ impl BentVessel {
 
 /// Contours as the images of a sweep, numbered in their order.
 pub fn numbered(contours: impl IntoIterator<Item = Contour>) -> Vec<ImageLumen> {
-    contours.into_iter().zip(0..).map(|(contour, number)| ImageLumen { number, lumen: Ok(contour) }).collect()
+    contours
+        .into_iter()
+        .zip(0..)
+        .map(|(contour, number)| ImageLumen { number, lumen: Ok(contour), others: Vec::new() })
+        .collect()
 }
 
 /// The numbers from 0 to `count` in an order of chance.

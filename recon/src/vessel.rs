@@ -1,11 +1,18 @@
 //! One vessel of the tree: its centreline, its tube, and what is measured on them.
 
+mod closed;
+mod root;
 mod sweeps;
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use crate::centreline::Centreline;
 use crate::surface::{self, LumenSurface, Samples, Tube};
+use root::Root;
+
+pub(crate) use closed::surface as closed_surface;
+
 use crate::{Contour, LumenSettings, ReconError, ReconWarning, Section, Stenosis, section, stenosis};
 
 /// Sections are this far apart (m).
@@ -26,12 +33,30 @@ pub struct Vessel {
     pub sections: Vec<Section>,
     /// Its narrowings.
     pub stenoses: Vec<Stenosis>,
+    /// Where it leaves the vessel it is a branch of; nothing for the first vessel, and where it was not seen to leave.
+    pub leaves: Option<Leaves>,
     /// The border's distance from the centreline, with its covariance.
     pub(crate) tube: Tube,
+    /// The stretch between the parent's middle and the branch's first section.
+    pub(crate) root: Option<Root>,
+    seen: Vec<Place>,
+    longest_gap_m: f64,
+}
+
+/// Where a branch leaves its parent.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Leaves {
+    /// The parent's number.
+    pub parent: usize,
+    /// Where it comes out of the parent's surface, along the parent's centreline (mm).
+    pub at_mm: f64,
+    /// Between the directions of the two, both away from the parent's beginning for a branch that goes on with the
+    /// blood (degrees).
+    pub angle_deg: f64,
 }
 
 /// Where along the centreline a contour lies.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Place {
     /// Length from the beginning (m).
     pub at_m: f64,
@@ -53,7 +78,20 @@ impl Fitted {
     /// From contours in the order of their images.
     pub(crate) fn to(contours: &[&Contour]) -> Result<Self, ReconError> {
         let centres: Vec<Vector3<f64>> = contours.iter().map(|contour| contour.centre.vector()).collect();
-        let mut centreline = Centreline::through(&centres)?;
+        Self::along(Centreline::through(&centres)?, contours)
+    }
+
+    /// A branch: it begins at the end that is nearer to one of `vessels`. Also which of them.
+    pub(crate) fn branch(contours: &[&Contour], vessels: &[Vessel]) -> Result<(Self, usize), ReconError> {
+        let centres: Vec<Vector3<f64>> = contours.iter().map(|contour| contour.centre.vector()).collect();
+        let line = Centreline::through(&centres)?;
+        let (parent, at_end) = root::parent(&line, vessels).ok_or(ReconError::NoFit { what: "branch" })?;
+        let line = if at_end { line.reversed() } else { line };
+        Ok((Self::along(line, contours)?, parent))
+    }
+
+    /// The tube along a first guess of the centreline, which moves to the middle of what is round it.
+    fn along(mut centreline: Centreline, contours: &[&Contour]) -> Result<Self, ReconError> {
         for _ in 0..ROUNDS {
             let shape = Tube::shape_of(&surface::coarse_samples(&centreline, contours))?;
             centreline = centreline.recentred(&shape)?;
@@ -88,12 +126,27 @@ impl Fitted {
         let surface = surface::grid(&centreline, &tube, settings.grid, measured);
         let sections = section::sections(&centreline, &tube, SECTION_STEP_M, measured);
         let stenoses = stenosis::find(&sections, settings.least_percent_area);
-        Vessel { number, centreline, surface, sections, stenoses, tube }
+        let longest_gap_m = settings.longest_gap_m;
+        let (leaves, root) = (None, None);
+        Vessel { number, centreline, surface, sections, stenoses, leaves, tube, root, seen, longest_gap_m }
+    }
+}
+
+impl Vessel {
+    /// Whether images show the lumen at a length (m).
+    fn is_measured(&self, at: f64) -> bool {
+        is_measured(&self.seen, at, self.longest_gap_m)
+    }
+
+    /// The same as a branch of one of `vessels`; as a vessel by itself when it was not seen to leave that one.
+    pub(crate) fn rooted(mut self, vessels: &[Self], parent: usize) -> Self {
+        (self.root, self.leaves) = root::root(&self, vessels, parent).unzip();
+        self
     }
 }
 
 /// Whether contours lie on both sides of a place, no farther apart than the longest gap.
-pub(crate) fn is_measured(seen: &[Place], at: f64, longest_gap: f64) -> bool {
+fn is_measured(seen: &[Place], at: f64, longest_gap: f64) -> bool {
     let after = seen.partition_point(|place| place.at_m < at);
     let next = seen.get(after).map_or(f64::INFINITY, |place| place.at_m - at);
     let last = after.checked_sub(1).and_then(|i| seen.get(i)).map_or(f64::INFINITY, |place| at - place.at_m);

@@ -23,6 +23,8 @@ pub(crate) struct Samples {
     pub means: [f64; 3],
     /// Standard deviation of its size (m).
     pub own_sd: f64,
+    /// Standard deviation of what it shares with all others (m).
+    pub common_sd: f64,
     /// Its place among the contours, in the order of their images.
     pub turn: usize,
     /// Its points.
@@ -84,13 +86,14 @@ fn of(line: &Centreline, contour: &Contour, turn: usize, step: usize) -> Option<
     // A contour has eleven free numbers, however many points draw it.
     points.iter_mut().for_each(|point| point.weight *= (AROUND as f64 / count).min(1.0));
     let [r, up, side, at] = sums.map(|sum| sum / count);
-    Some(Samples { at, means: [r, up, side], own_sd, turn, points })
+    let common_sd = contour.common_sd_mm * 1e-3;
+    Some(Samples { at, means: [r, up, side], own_sd, common_sd, turn, points })
         .filter(|samples| samples.at.is_finite() && r.is_finite() && own_sd.is_finite())
 }
 
 /// Standard deviation of a contour's point, the pose's in it (m).
-fn sd(contour: &Contour, _k: usize) -> f64 {
-    (contour.sd_mm * 1e-3).hypot(POSE_SD_M)
+fn sd(contour: &Contour, k: usize) -> f64 {
+    (contour.points_sd_mm.get(k).copied().unwrap_or(contour.sd_mm) * 1e-3).hypot(POSE_SD_M)
 }
 
 /// A point, and its place across the vessel.

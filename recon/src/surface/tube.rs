@@ -1,6 +1,6 @@
 //! The tube: the border's distance from the centreline as a function of length and angle.
 
-use nalgebra::SMatrix;
+use nalgebra::{SMatrix, SVector};
 use probepath_frames::{Point, World};
 
 use super::equations;
@@ -36,11 +36,15 @@ pub(crate) struct Shape {
     coefficients: Vec<f64>,
 }
 
+/// Covariance of a section's harmonics (m2).
+pub(crate) type SectionCovariance = SMatrix<f64, AROUND, AROUND>;
+
 /// A shape that knows how sure it is.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Tube {
     shape: Shape,
     covariance: InBand,
+    common_sd_m: f64,
 }
 
 impl Shape {
@@ -85,7 +89,9 @@ impl Tube {
     /// Fitted to contours that are sorted by their places.
     pub(crate) fn fit(contours: &[Samples]) -> Result<Self, ReconError> {
         let (shape, factor) = solve(contours).ok_or(NO_FIT)?;
-        Ok(Self { shape, covariance: factor.inverse_in_band() })
+        let common: f64 = contours.iter().map(|contour| contour.common_sd).sum();
+        let common_sd_m = common / contours.len().max(1) as f64;
+        Ok(Self { shape, covariance: factor.inverse_in_band(), common_sd_m })
     }
 
     /// The same without the covariance.
@@ -104,7 +110,7 @@ impl Tube {
     }
 
     /// Covariance of these harmonics (m2): what speckle and single poses leave open, nothing that all images share.
-    pub(crate) fn covariance(&self, at: f64) -> SMatrix<f64, AROUND, AROUND> {
+    pub(crate) fn covariance(&self, at: f64) -> SectionCovariance {
         let (first, along) = self.shape.knots.basis(at);
         let mut sum = SMatrix::zeros();
         for (a, left) in along.iter().enumerate() {
@@ -137,6 +143,14 @@ impl Tube {
             centre.point.moved(centre.up, r * cos).moved(centre.side, r * sin)
         };
         angles.iter().map(point).collect()
+    }
+}
+
+impl Tube {
+    /// Standard deviation of the distance in a direction, from the section's covariance and what all images share (m).
+    pub(crate) fn sd(&self, covariance: &SectionCovariance, turn: (f64, f64)) -> f64 {
+        let round = SVector::from(harmonics_of(turn));
+        round.dot(&(covariance * round)).max(0.0).sqrt().hypot(self.common_sd_m)
     }
 }
 
