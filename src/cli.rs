@@ -28,7 +28,7 @@ pub enum Command {
     /// Where the image is on the probe, when it was formed, and how sure that is.
     #[command(subcommand)]
     Calibrate(Calibrate),
-    /// The lumen of an exam once more, or the volume of a tracked sequence.
+    /// The lumen of an exam or of a tracked sequence: surface, centreline, sections, stenoses, report; and the volume.
     Reconstruct(Reconstruct),
     /// How far a surface is from a gold standard.
     Compare(Compare),
@@ -70,10 +70,11 @@ pub struct Scan {
 pub struct Reconstruct {
     /// An exam (.mcap) or a tracked sequence (.igs.mha, .igs.mhd, .igs.nrrd).
     pub input: PathBuf,
-    /// The calibration: probepath's own (.toml) or a PLUS device set (.xml). An exam holds its own.
+    /// The calibration: probepath's own (.toml) or a PLUS device set (.xml). An exam holds its own; another of the same
+    /// setting (.toml) takes its place.
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<PathBuf>,
-    /// Build the volume.
+    /// Build the volume too.
     #[arg(long)]
     pub volume: bool,
     /// Folder for what is made.
@@ -177,6 +178,12 @@ pub struct Validate {
     /// Only this setting of the table ("zoom 3:7").
     #[arg(long, value_name = "NAME")]
     pub setting: Option<String>,
+    /// How many seeds of table2 at a time.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub jobs: usize,
+    /// Folder that keeps what every seed of table2 gave; what is there already is not run again.
+    #[arg(long, value_name = "DIR")]
+    pub keep: Option<PathBuf>,
 }
 
 /// What can be validated.

@@ -21,13 +21,7 @@ pub fn perform(command: Command, screen: &Screen) -> Outcome {
     let document = match command {
         Command::Scan(args) => return scan(args, screen),
         Command::Calibrate(which) => return calibrate::perform(which, screen),
-        Command::Reconstruct(args) => Document::of(&offline::reconstruct(
-            &args.input,
-            args.calibration.as_deref(),
-            args.volume,
-            &args.out,
-            &*screen.progress(),
-        )?),
+        Command::Reconstruct(args) => return reconstruct(args, screen),
         Command::Compare(args) => Document::of(&offline::compare(&args.surface, &args.gold, !args.in_place)?),
         Command::Convert(args) => Document::of(&offline::convert(&args.input, &args.output)?),
         Command::Simulate(args) => return simulate::perform(args, screen),
@@ -47,6 +41,12 @@ fn arm(args: crate::cli::Arm) -> Outcome {
     Ok(Document::of(&offline::arm(&question)?)?)
 }
 
+fn reconstruct(args: crate::cli::Reconstruct, screen: &Screen) -> Outcome {
+    let crate::cli::Reconstruct { input, calibration, volume, out } = args;
+    let wish = offline::ReconstructWish { input, calibration, volume, out };
+    Ok(Document::of(&offline::reconstruct(&wish, &*screen.progress())?)?)
+}
+
 fn scan(args: crate::cli::Scan, screen: &Screen) -> Outcome {
     let operator = Operator::new();
     let stopping = operator.clone();
@@ -62,11 +62,16 @@ fn today() -> String {
     jiff::Timestamp::now().strftime("%Y-%m-%d").to_string()
 }
 
+fn table2_wish(args: &crate::cli::Validate) -> validate::Table2Wish {
+    let crate::cli::Validate { seeds, setting, jobs, keep, .. } = args;
+    validate::Table2Wish { seeds: *seeds, setting: setting.clone(), jobs: *jobs, keep: keep.clone() }
+}
+
 fn validated(args: &crate::cli::Validate, screen: &Screen) -> Outcome {
     let (progress, seeds) = (screen.progress(), args.seeds);
     Ok(match args.goal {
         Goal::Table1 => Document::of(&validate::table1(seeds, args.setting.as_deref(), &*progress)?),
-        Goal::Table2 => Document::of(&validate::table2(seeds, args.setting.as_deref(), &*progress)?),
+        Goal::Table2 => Document::of(&validate::table2(&table2_wish(args), &*progress)?),
         Goal::Force => Document::of(&validate::force(seeds, &*progress)?),
         Goal::Soak => Document::of(&validate::soak(&validate::SoakWish::wall(args.minutes), &*progress)?),
         Goal::Motion => Document::of(&validate::motion(seeds, &*progress)?),

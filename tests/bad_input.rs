@@ -155,7 +155,9 @@ fn an_exam_cut_anywhere_is_reconstructed_as_far_as_it_goes_or_refused_in_words()
     let (mut made, mut refused) = (0, 0);
     for eighth in 0..8 {
         fs::write(&cut, &whole[..whole.len() * eighth / 8]).unwrap();
-        match offline::reconstruct(&cut, None, false, &out.join("made"), &()) {
+        let wish =
+            offline::ReconstructWish { input: cut.clone(), out: out.join("made"), ..Default::default() };
+        match offline::reconstruct(&wish, &()) {
             Ok(found) => {
                 assert!(found.notes.iter().any(|note| note.contains("does not end")), "{found}");
                 made += 1;

@@ -136,7 +136,8 @@ fn clone_of(exam: &Exam) -> Exam {
 /// `reconstruct` of the exam finds the same stenoses and areas.
 fn reconstructed_again(out: &Path, report: &probepath_scripts::report::Report) {
     let again = out.join("again");
-    let made = offline::reconstruct(&out.join("exam.mcap"), None, false, &again, &()).unwrap();
+    let wish = offline::ReconstructWish { input: out.join("exam.mcap"), out: again, ..Default::default() };
+    let made = offline::reconstruct(&wish, &()).unwrap();
     let made = made.report.unwrap();
     assert_eq!((&made.stenoses, &made.segments), (&report.stenoses, &report.segments));
     assert_eq!(made.area_curve, report.area_curve);

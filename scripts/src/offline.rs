@@ -13,5 +13,7 @@ mod simulate;
 pub use arm::{ArmAnswer, ArmError, ArmQuestion, arm};
 pub use compare::{CompareError, Comparison, compare};
 pub use convert::{ConvertError, Converted, convert};
-pub use reconstruct::{ReconstructError, Reconstructed, reconstruct};
+pub use reconstruct::{
+    ImagesOf, ReconstructError, ReconstructWish, Reconstructed, Timing, VolumeMade, reconstruct,
+};
 pub use simulate::{Served, ServedArm, SimulateError, SimulateRequest, Simulating, simulate};

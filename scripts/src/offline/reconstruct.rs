@@ -1,43 +1,59 @@
-//! `probepath reconstruct`: an exam's lumen once more, or a tracked sequence's volume.
+//! `probepath reconstruct`: the lumen of an exam or of any tracked sequence, and its volume.
 
+mod clip;
+mod error;
+mod input;
+mod tables;
+mod volume;
+
+use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
-use probepath_recon::volume::{Layer, Mark, Slice, Volume, VolumeError, VolumeSettings};
-use probepath_recon::{LumenSettings, ReconError, reconstruct_lumen};
-use probepath_teach_replay::Path as TaughtPath;
-use probepath_us_capture::exam::{Attachment, Ending, Exam, ExamError};
-use probepath_us_capture::plus::{PlusConfig, PlusError};
-use probepath_us_capture::sequence::{
-    NoChain, PlacedSequence, Placing, ReadOptions, Sequence, SequenceError,
-};
-use probepath_us_capture::{BadCalibration, BadPixelMap, Calibration, PixelMap, PlacedBScan};
+use probepath_recon::{LumenReconstruction, ReconError, check_sweep, reconstruct_from, segment};
 use serde::Serialize;
-use thiserror::Error;
 
 use crate::progress::Progress;
-use crate::report::build::{Ingredients, ReportError, ScanFigures, Segment, make};
-use crate::report::{Heading, Report};
-use crate::session::{SCAN_FIGURES, SEGMENTS, SOFTWARE};
+use crate::report::build::{Ingredients, make};
+use crate::report::{Report, StenosisRow};
+pub use error::ReconstructError;
+use input::Input;
+pub use volume::VolumeMade;
 
-/// Voxel size when nothing says another (mm).
-const VOXEL_MM: f64 = 0.5;
-
-/// A calibration whose rigid part is further off than this (m) is worth a note.
-const SHEAR_M: f64 = 0.0005;
+/// What is to be reconstructed, and from what.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ReconstructWish {
+    /// An exam (`.mcap`) or a tracked sequence.
+    pub input: PathBuf,
+    /// Where the pixels are: our own calibration (`.toml`) or a PLUS configuration (`.xml`). An exam holds its own.
+    pub calibration: Option<PathBuf>,
+    /// Whether a volume is built as well.
+    pub volume: bool,
+    /// Folder for what is made.
+    pub out: PathBuf,
+}
 
 /// What was reconstructed.
 #[derive(Clone, Debug, Serialize)]
 pub struct Reconstructed {
     /// The exam or sequence.
     pub input: PathBuf,
-    /// Images that have a place.
-    pub images: usize,
-    /// Those left out, reason by reason.
-    pub left_out: Vec<String>,
+    /// What became of its images.
+    pub images: ImagesOf,
+    /// The lumen's surface (STL; PLY and VTP beside it); none when only a volume could be made.
+    pub surface: Option<PathBuf>,
+    /// The centreline (CSV).
+    pub centreline: Option<PathBuf>,
+    /// The sections normal to it (CSV): place, area, diameters.
+    pub sections: Option<PathBuf>,
+    /// The narrowings, along the vessel.
+    pub stenoses: Vec<StenosisRow>,
     /// What the reader must know.
     pub notes: Vec<String>,
-    /// The report, of an exam.
+    /// What each stage took.
+    pub timing_s: Timing,
+    /// The report.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub report: Option<Report>,
     /// The volume, when one was asked for.
@@ -45,275 +61,182 @@ pub struct Reconstructed {
     pub volume: Option<VolumeMade>,
 }
 
-/// A volume that was written.
-#[derive(Clone, Debug, Serialize)]
-pub struct VolumeMade {
-    /// Its file, MHA.
-    pub file: PathBuf,
-    /// Which voxels were seen (1) or filled (2).
-    pub marks: PathBuf,
-    /// Voxels along x, y, z.
-    pub size: [usize; 3],
-    /// Their size (mm).
-    pub spacing_mm: [f64; 3],
-    /// Voxels that pixels were put into.
-    pub seen: usize,
-    /// Voxels that were filled.
-    pub filled: usize,
-    /// Memory it was built in (MB).
-    pub memory_mb: f64,
+/// What became of the images.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct ImagesOf {
+    /// Images in the file.
+    pub total: usize,
+    /// Those whose contour is in the surface.
+    pub used: usize,
+    /// The others, by reason: without a place, or without a lumen that can be trusted.
+    pub refused: BTreeMap<String, usize>,
 }
 
-/// What cannot be reconstructed.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum ReconstructError {
-    /// The folder or a file.
-    #[error("cannot write into {}: {source}", path.display())]
-    Folder {
-        /// The folder.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The exam.
-    #[error(transparent)]
-    Exam(#[from] ExamError),
-    /// The sequence.
-    #[error(transparent)]
-    Sequence(#[from] SequenceError),
-    /// The PLUS configuration.
-    #[error(transparent)]
-    Plus(#[from] PlusError),
-    /// Our own calibration.
-    #[error(transparent)]
-    Calibration(#[from] BadCalibration),
-    /// A calibration that places no pixels.
-    #[error(transparent)]
-    PixelMap(#[from] BadPixelMap),
-    /// The transforms.
-    #[error(transparent)]
-    Chain(#[from] NoChain),
+/// What each stage took (s, of the clock on the wall).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Timing {
+    /// Reading the file and giving each image its place.
+    pub reading: f64,
+    /// The lumen in each image.
+    pub lumen: f64,
+    /// Surface, centreline, sections and stenoses.
+    pub surface: f64,
+    /// Tables, meshes, pictures and the report's page.
+    pub report: f64,
     /// The volume.
-    #[error(transparent)]
-    Volume(#[from] VolumeError),
-    /// The lumen.
-    #[error(transparent)]
-    Lumen(#[from] ReconError),
-    /// The report.
-    #[error(transparent)]
-    Report(#[from] ReportError),
-    /// A sequence without a calibration.
-    #[error("{}: a sequence says where the probe was, not where its pixels are: give --calibration FILE (.toml or .xml)", path.display())]
-    NoCalibration {
-        /// The sequence.
-        path: PathBuf,
-    },
-    /// An exam without B-scans.
-    #[error("{}: the exam holds no B-scan", path.display())]
-    NoImages {
-        /// The exam.
-        path: PathBuf,
-    },
+    pub volume: f64,
+    /// All of it.
+    pub total: f64,
 }
 
-/// Reconstructs an exam (`.mcap`) or a sequence.
+/// Reconstructs an exam (`.mcap`) or a tracked sequence.
+///
+/// Where a volume was asked for, images without a lumen still give one, and a note says why there is no surface.
 ///
 /// # Errors
-/// When a file cannot be read, nothing says where the pixels are, or nothing can be made of it.
+/// When a file cannot be read or written, nothing says where the pixels are, or nothing can be made of them.
 pub fn reconstruct(
-    input: &Path,
-    calibration: Option<&Path>,
-    volume: bool,
-    out: &Path,
+    wish: &ReconstructWish,
     progress: &dyn Progress,
 ) -> Result<Reconstructed, ReconstructError> {
-    std::fs::create_dir_all(out).map_err(|source| ReconstructError::Folder { path: out.into(), source })?;
-    if input.extension().is_some_and(|ending| ending == "mcap") {
-        exam(input, volume, out, progress)
+    let folder = |source| ReconstructError::Folder { path: wish.out.clone(), source };
+    std::fs::create_dir_all(&wish.out).map_err(folder)?;
+    let begun = Instant::now();
+    let mut timing = Timing::default();
+    progress.at("reading", 0.0);
+    let input = timed(&mut timing.reading, || read(wish))?;
+    progress.at("looking for the lumen", 0.2);
+    let found = lumen(&input, &mut timing);
+    let mut made = Reconstructed::of(wish, &input);
+    match found {
+        Ok(recon) => {
+            progress.at("reporting", 0.7);
+            timed(&mut timing.report, || made.write(wish, &input, &recon))?;
+        }
+        Err(why) if wish.volume => made.notes.push(format!("no surface: {why}")),
+        Err(source) => return Err(ReconstructError::Lumen { path: wish.input.clone(), source }),
+    }
+    if wish.volume {
+        progress.at("building the volume", 0.8);
+        let build = || volume::build(&input.slices(), &input.volume, &wish.out);
+        made.volume = Some(timed(&mut timing.volume, build)?);
+    }
+    timing.total = begun.elapsed().as_secs_f64();
+    made.timing_s = timing;
+    Ok(made)
+}
+
+/// Does it, and adds what it took.
+fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
+    let begun = Instant::now();
+    let done = work();
+    *seconds += begun.elapsed().as_secs_f64();
+    done
+}
+
+fn read(wish: &ReconstructWish) -> Result<Input, ReconstructError> {
+    let calibration = wish.calibration.as_deref();
+    if wish.input.extension().is_some_and(|ending| ending == "mcap") {
+        Input::of_exam(&wish.input, calibration)
     } else {
-        let calibration =
-            calibration.ok_or_else(|| ReconstructError::NoCalibration { path: input.into() })?;
-        sequence(input, calibration, volume, out, progress)
+        Input::of_sequence(&wish.input, calibration)
     }
 }
 
-fn exam(
-    input: &Path,
-    volume: bool,
-    out: &Path,
-    progress: &dyn Progress,
-) -> Result<Reconstructed, ReconstructError> {
-    progress.at("reading", 0.0);
-    let exam = Exam::open(input)?;
-    if exam.bscans.is_empty() {
-        return Err(ReconstructError::NoImages { path: input.into() });
-    }
-    let mut notes: Vec<String> = exam
-        .damaged
-        .iter()
-        .map(|(at, why)| format!("damaged at byte {at}: {why}; the rest was read"))
-        .collect();
-    if exam.ending != Ending::Complete {
-        notes.push(format!(
-            "the recording does not end as it should ({:?}); what is there was used",
-            exam.ending
-        ));
-    }
-    progress.at("reconstructing", 0.2);
-    let recon = reconstruct_lumen(&exam.bscans, &LumenSettings::default())?;
-    progress.at("reporting", 0.9);
-    let mut figures: ScanFigures = json(&exam, SCAN_FIGURES).unwrap_or_default();
-    figures.warnings.extend(notes.iter().cloned());
-    let segments: Vec<Segment> = json(&exam, SEGMENTS).unwrap_or_default();
-    let from = Ingredients {
-        heading: heading(&exam, &figures),
-        figures: &figures,
-        recon: &recon,
-        images: &exam.bscans,
-        segments: &segments,
-        surface_error: None,
-        exam: input,
-    };
-    let report = make(&from, out)?;
-    let volume = volume.then(|| of_images(&exam.bscans, out)).transpose()?;
-    let images = exam.bscans.len();
-    Ok(Reconstructed {
-        input: input.into(),
-        images,
-        left_out: Vec::new(),
-        notes,
-        report: Some(report),
-        volume,
-    })
+fn lumen(input: &Input, timing: &mut Timing) -> Result<LumenReconstruction, ReconError> {
+    check_sweep(&input.images, &input.lumen)?;
+    let lumens = timed(&mut timing.lumen, || segment(&input.images, &input.lumen));
+    timed(&mut timing.surface, || reconstruct_from(lumens, &input.lumen))
 }
 
-/// An attachment of our own that was kept as JSON.
-fn json<T: serde::de::DeserializeOwned>(exam: &Exam, name: &str) -> Option<T> {
-    serde_json::from_slice(&exam.attachment(name)?.bytes).ok()
-}
+impl Reconstructed {
+    /// Nothing was made yet.
+    fn of(wish: &ReconstructWish, input: &Input) -> Self {
+        Self {
+            input: wish.input.clone(),
+            images: ImagesOf { total: input.total, used: 0, refused: input.refused.clone() },
+            surface: None,
+            centreline: None,
+            sections: None,
+            stenoses: Vec::new(),
+            notes: input.notes.clone(),
+            timing_s: Timing::default(),
+            report: None,
+            volume: None,
+        }
+    }
 
-fn heading(exam: &Exam, figures: &ScanFigures) -> Heading {
-    let calibration = exam.attachment(Attachment::CALIBRATION).and_then(|a| a.text().ok());
-    let calibration = calibration.and_then(|text| Calibration::from_toml(text).ok());
-    let path = exam.attachment(Attachment::PATH).and_then(|a| a.text().ok());
-    let path = path.and_then(|text| TaughtPath::from_text(text, Path::new(Attachment::PATH)).ok());
-    let side = path.map_or_else(String::new, |path| format!("{:?}", path.label().side).to_lowercase());
-    Heading {
-        study: exam.header.study_code.clone(),
-        side,
-        cell: "recorded".into(),
-        protocol: exam.header.protocol.clone(),
-        protocol_sha256: exam.header.protocol_sha256.clone(),
-        software: format!("{SOFTWARE}, recorded with {}", exam.header.software),
-        speed_mm_s: figures.speed_mm_s,
-        ..calibration.as_ref().map(Heading::of_calibration).unwrap_or_default()
+    /// Tables, surfaces and the report.
+    fn write(
+        &mut self,
+        wish: &ReconstructWish,
+        input: &Input,
+        recon: &LumenReconstruction,
+    ) -> Result<(), ReconstructError> {
+        let mut figures = input.figures.clone();
+        figures.warnings.extend(self.notes.iter().cloned());
+        let from = Ingredients {
+            heading: input.heading.clone(),
+            figures: &figures,
+            recon,
+            images: &input.images,
+            segments: &input.segments,
+            surface_error: None,
+            exam: &wish.input,
+        };
+        let report = make(&from, &wish.out)?;
+        self.images.used = recon.counts.images - recon.counts.without_lumen;
+        for (why, count) in &recon.counts.reasons {
+            *self.images.refused.entry(why.clone()).or_default() += count;
+        }
+        self.surface = report.surfaces.first().map(PathBuf::from);
+        self.centreline = Some(table(&wish.out, "centreline.csv", &tables::centreline(recon))?);
+        self.sections = Some(table(&wish.out, "sections.csv", &tables::sections(recon))?);
+        self.stenoses.clone_from(&report.stenoses);
+        self.report = Some(report);
+        Ok(())
     }
 }
 
-fn of_images(images: &[PlacedBScan], out: &Path) -> Result<VolumeMade, ReconstructError> {
-    let slices: Vec<Slice<'_>> = images.iter().map(Slice::from).collect();
-    build(&slices, &VolumeSettings::every_mm(VOXEL_MM), out)
-}
-
-fn sequence(
-    input: &Path,
-    calibration: &Path,
-    volume: bool,
-    out: &Path,
-    progress: &dyn Progress,
-) -> Result<Reconstructed, ReconstructError> {
-    progress.at("reading", 0.0);
-    let sequence = Sequence::read(input, &ReadOptions::default())?;
-    let (placing, settings) = chain(calibration)?;
-    let placed: PlacedSequence = sequence.place(&placing)?;
-    progress.at("building", 0.3);
-    let slices: Vec<Slice<'_>> = placed.images.iter().map(Slice::from).collect();
-    let made = volume.then(|| build(&slices, &settings, out)).transpose()?;
-    let mut notes: Vec<String> = sequence.notes().iter().map(ToString::to_string).collect();
-    if placed.unstamped > 0 {
-        notes.push(format!("{} images carry no stamp", placed.unstamped));
+fn table(folder: &Path, name: &str, text: &str) -> Result<PathBuf, ReconstructError> {
+    let path = folder.join(name);
+    match std::fs::write(&path, text) {
+        Ok(()) => Ok(path),
+        Err(source) => Err(ReconstructError::Folder { path, source }),
     }
-    if placed.off_rigid_m > SHEAR_M {
-        notes.push(format!(
-            "the calibration is no rigid pose and a pixel size: a rigid one is up to {:.2} mm off; the volume was built \
-             with it as it stands",
-            placed.off_rigid_m * 1e3
-        ));
-    }
-    if !volume {
-        notes.push("nothing was built: ask for --volume".into());
-    }
-    Ok(Reconstructed {
-        input: input.into(),
-        images: placed.images.len(),
-        left_out: placed
-            .skipped
-            .iter()
-            .map(|(why, count)| format!("{count} images left out: {why}"))
-            .collect(),
-        notes,
-        report: None,
-        volume: made,
-    })
-}
-
-/// Where the pixels are, and how a volume is built, as a calibration or a PLUS configuration says.
-fn chain(calibration: &Path) -> Result<(Placing, VolumeSettings), ReconstructError> {
-    if calibration.extension().is_some_and(|ending| ending == "xml") {
-        let config = PlusConfig::read(calibration)?;
-        let settings =
-            config.volume.as_ref().map_or_else(|| VolumeSettings::every_mm(VOXEL_MM), VolumeSettings::from);
-        return Ok((Placing::from_plus(&config)?, settings));
-    }
-    let calibration = Calibration::read(calibration)?;
-    let map = PixelMap::of(&calibration.probe_from_image, calibration.setting.spacing);
-    Ok((Placing { lag: calibration.image_lag, ..Placing::new(map) }, VolumeSettings::every_mm(VOXEL_MM)))
-}
-
-fn build(
-    slices: &[Slice<'_>],
-    settings: &VolumeSettings,
-    out: &Path,
-) -> Result<VolumeMade, ReconstructError> {
-    let volume = Volume::build(slices, settings)?;
-    let (file, marks) = (out.join("volume.mha"), out.join("volume-marks.mha"));
-    volume.write(&file, Layer::Grey)?;
-    volume.write(&marks, Layer::Marks)?;
-    Ok(VolumeMade {
-        file,
-        marks,
-        size: volume.grid().size,
-        spacing_mm: volume.grid().spacing_m.map(|s| s * 1e3),
-        seen: volume.count(Mark::Seen),
-        filled: volume.count(Mark::Filled),
-        memory_mb: settings.memory_bytes(volume.grid()) as f64 / 1e6,
-    })
 }
 
 impl fmt::Display for Reconstructed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{}: {} images with a place", self.input.display(), self.images)?;
-        for line in self.left_out.iter().chain(&self.notes) {
+        writeln!(f, "{}: {} images", self.input.display(), self.images.total)?;
+        if self.surface.is_some() {
+            writeln!(f, "{} show the lumen", self.images.used)?;
+        }
+        for (why, count) in &self.images.refused {
+            writeln!(f, "{count} left out: {why}")?;
+        }
+        for line in &self.notes {
             writeln!(f, "note: {line}")?;
         }
         if let Some(report) = &self.report {
             write!(f, "{report}")?;
         }
-        if let Some(volume) = &self.volume {
-            let ([x, y, z], [sx, sy, sz]) = (volume.size, volume.spacing_mm);
-            writeln!(
-                f,
-                "volume {x} x {y} x {z} of {sx:.3} x {sy:.3} x {sz:.3} mm, {} voxels seen, {} filled, {:.0} MB to build",
-                volume.seen, volume.filled, volume.memory_mb
-            )?;
-            writeln!(
-                f,
-                "  {} (which voxels were seen or filled: {})",
-                volume.file.display(),
-                volume.marks.display()
-            )?;
+        for path in [&self.centreline, &self.sections].into_iter().flatten() {
+            writeln!(f, "  {}", path.display())?;
         }
-        Ok(())
+        if let Some(volume) = &self.volume {
+            write!(f, "{volume}")?;
+        }
+        writeln!(f, "{}", self.timing_s)
+    }
+}
+
+impl fmt::Display for Timing {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{:.1} s: reading {:.1}, lumen {:.1}, surface {:.1}, report {:.1}, volume {:.1}",
+            self.total, self.reading, self.lumen, self.surface, self.report, self.volume
+        )
     }
 }

@@ -8,7 +8,7 @@ use probepath_teach_replay::{
     Path, Plan, PlanSettings, Replay, ReplayEnding, ReplayPhase, ReplaySettings, ReplayStatus,
 };
 use probepath_us_capture::exam::Attachment;
-use probepath_us_capture::{Capture, Counts, Keeping, PlacedBScan};
+use probepath_us_capture::{Calibration, Capture, Counts, Keeping, PlacedBScan};
 
 use super::figures::Figures;
 use super::motion::Motion;
@@ -20,6 +20,11 @@ use crate::report::build::{ReportError, ScanFigures};
 
 /// Name of the attachment that keeps what a scan has to say, so that a report can be made again from the exam.
 pub(crate) const SCAN_FIGURES: &str = "scan.json";
+
+/// How a lumen is looked for in images that were taken with a calibration.
+pub(crate) fn lumen_settings(_calibration: Option<&Calibration>) -> LumenSettings {
+    LumenSettings::default()
+}
 
 /// How a path is to be scanned.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -270,7 +275,7 @@ impl Session {
     pub fn reconstruct(&mut self, scan: &Scan, seed: Option<(f64, f64)>) -> Result<Lumen, SessionError> {
         self.opening.progress.at("reconstructing", 0.0);
         let seed = seed.map(|(x, y)| SeedPoint::Millimetres { x_mm: x * 1e3, y_mm: y * 1e3 });
-        let settings = LumenSettings { seed, ..LumenSettings::default() };
+        let settings = LumenSettings { seed, ..lumen_settings(self.cell.calibration.as_ref()) };
         let recon = reconstruct_lumen(&scan.images, &settings)?;
         self.opening.progress.at("reconstructing", 1.0);
         Ok(Lumen { recon, scan: scan.clone() })

@@ -22,6 +22,8 @@ pub struct Placing {
     pub probe_from_pixel: PixelMap<Probe>,
     /// The way from the probe to the system that becomes World.
     pub chain: ChainNames,
+    /// How the machine was set, where that is known: a file does not say.
+    pub setting: Option<Setting>,
     /// An image stamped t belongs to the pose at t + lag.
     pub lag: Span,
     /// Poses further apart are not interpolated between (only asked for with a lag).
@@ -34,6 +36,7 @@ impl Placing {
         Self {
             probe_from_pixel,
             chain: ChainNames::default(),
+            setting: None,
             lag: Span::ZERO,
             widest_gap: Span::from_milliseconds(1000),
         }
@@ -143,8 +146,8 @@ impl PlacedSequence {
 impl Sequence {
     /// Gives every image its place, where it has one.
     ///
-    /// The file says no depth and no focus: depth and window are taken from the calibrated size of the picture, the
-    /// focus as the middle of it.
+    /// The file says no depth and no focus: unless the setting is given, depth and window are taken from the calibrated
+    /// size of the picture, the focus as the middle of it.
     ///
     /// # Errors
     /// When no chain of transforms leads from the probe to the reference.
@@ -152,7 +155,7 @@ impl Sequence {
         let chain = Chain::find(self, &placing.chain)?;
         let track = (placing.lag != Span::ZERO).then(|| self.track(&chain, placing));
         let (probe_from_image, spacing) = placing.probe_from_pixel.nearest_rigid();
-        let setting = setting_of(spacing, self.width, self.height);
+        let setting = placing.setting.unwrap_or_else(|| setting_of(spacing, self.width, self.height));
         let off_rigid_m = placing.probe_from_pixel.off_rigid_m(self.width, self.height);
         let mut placed =
             PlacedSequence { images: Vec::new(), skipped: Skipped::new(), unstamped: 0, off_rigid_m };

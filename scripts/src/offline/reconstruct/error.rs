@@ -1,0 +1,112 @@
+//! What cannot be reconstructed.
+
+use std::path::PathBuf;
+
+use probepath_recon::ReconError;
+use probepath_recon::volume::VolumeError;
+use probepath_us_capture::exam::ExamError;
+use probepath_us_capture::plus::PlusError;
+use probepath_us_capture::sequence::{NoChain, SequenceError};
+use probepath_us_capture::{BadBScan, BadCalibration, BadPixelMap};
+use thiserror::Error;
+
+use crate::report::build::ReportError;
+
+/// What cannot be reconstructed.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ReconstructError {
+    /// The folder or a file.
+    #[error("cannot write {}: {source}", path.display())]
+    Folder {
+        /// The folder or file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The exam.
+    #[error(transparent)]
+    Exam(#[from] ExamError),
+    /// The sequence.
+    #[error(transparent)]
+    Sequence(#[from] SequenceError),
+    /// The PLUS configuration.
+    #[error(transparent)]
+    Plus(#[from] PlusError),
+    /// Our own calibration.
+    #[error(transparent)]
+    Calibration(#[from] BadCalibration),
+    /// A calibration that places no pixels.
+    #[error(transparent)]
+    PixelMap(#[from] BadPixelMap),
+    /// The transforms.
+    #[error(transparent)]
+    Chain(#[from] NoChain),
+    /// The volume.
+    #[error(transparent)]
+    Volume(#[from] VolumeError),
+    /// The lumen.
+    #[error("{}: {source}", path.display())]
+    Lumen {
+        /// The exam or sequence.
+        path: PathBuf,
+        /// Why.
+        source: ReconError,
+    },
+    /// The report.
+    #[error(transparent)]
+    Report(#[from] ReportError),
+    /// A sequence without a calibration.
+    #[error("{}: a sequence says where the probe was, not where its pixels are: give --calibration FILE (.toml or .xml)", path.display())]
+    NoCalibration {
+        /// The sequence.
+        path: PathBuf,
+    },
+    /// An exam without B-scans.
+    #[error("{}: the exam holds no B-scan", path.display())]
+    NoImages {
+        /// The exam.
+        path: PathBuf,
+    },
+    /// A sequence in which no image has a place.
+    #[error("{}: none of its {images} images has a place: {why}", path.display())]
+    NonePlaced {
+        /// The sequence.
+        path: PathBuf,
+        /// How many images there are.
+        images: usize,
+        /// Reason by reason.
+        why: String,
+    },
+    /// A calibration of pictures of another size.
+    #[error(
+        "calibration {id} is of another setting: its pictures have {} x {} pixels, those of {} have {} x {}; \
+         calibrate the setting that was scanned with", calibrated.0, calibrated.1, path.display(), there.0, there.1
+    )]
+    OtherSize {
+        /// The sequence.
+        path: PathBuf,
+        /// The calibration.
+        id: String,
+        /// Columns and rows that it was made for.
+        calibrated: (usize, usize),
+        /// Columns and rows of the images.
+        there: (usize, usize),
+    },
+    /// A clip region that is not in the picture.
+    #[error(
+        "the clip rectangle of the configuration begins at {origin:?} and has {size:?} pixels: it is not in pictures \
+         of {} x {}", there.0, there.1
+    )]
+    Clip {
+        /// First column and row.
+        origin: [usize; 2],
+        /// Columns and rows.
+        size: [usize; 2],
+        /// Columns and rows of the images.
+        there: (usize, usize),
+    },
+    /// A part of a picture that is none.
+    #[error(transparent)]
+    Picture(#[from] BadBScan),
+}
