@@ -42,11 +42,11 @@ pub use recorded::protocol_of;
 pub(crate) use recorded::row as recorded_row;
 pub(crate) use report::SEGMENTS;
 pub use report::{ReportWish, Segment};
-pub(crate) use scan::SCAN_FIGURES;
 pub use scan::{Lumen, Scan, ScanWish};
+pub(crate) use scan::{SCAN_FIGURES, lumen_settings};
 pub use teach::{GuideBy, TeachWish};
 pub use true_contact::TrueContact;
-pub use truth::{CalibrationTruth, StenosisError};
+pub use truth::{CalibrationTruth, SectionError, StenosisError};
 pub use visit::{CalibrationPlan, PhantomImages, VisitWish, Visits};
 
 use crate::progress::Progress;
@@ -176,6 +176,11 @@ impl Session {
     /// Every true stenosis inside a reconstruction, beside what was found; only a simulated cell can say.
     pub fn stenosis_errors(&self, lumen: &Lumen) -> Vec<StenosisError> {
         self.truth().map(|truth| truth::stenoses(truth, &lumen.recon)).unwrap_or_default()
+    }
+
+    /// Every measured section of a reconstruction beside the true one; only a simulated cell can say.
+    pub fn section_errors(&self, lumen: &Lumen) -> Vec<SectionError> {
+        self.truth().map(|truth| truth::sections(truth, &lumen.recon)).unwrap_or_default()
     }
 
     /// How far a calibration is from where the image truly is; only a simulated cell can say.

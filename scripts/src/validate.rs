@@ -20,7 +20,7 @@ pub use motion::{Shares, motion, shares};
 pub use safety::safety;
 pub use soak::{SoakWish, soak};
 pub use table1::table1;
-pub use table2::table2;
+pub use table2::{Table2Wish, table2};
 
 use crate::session::SessionError;
 

@@ -32,6 +32,10 @@ pub struct HandConfig {
     pub unsteadiness: f64,
     /// Whether it pauses, turns back, hurries and lifts on the way.
     pub mishaps: bool,
+    /// How far it turns the probe about its beam, off square to the vessel (degrees), and leans it along the vessel.
+    pub turn_deg: f64,
+    /// See `turn_deg`.
+    pub lean_deg: f64,
 }
 
 impl Default for HandConfig {
@@ -43,6 +47,8 @@ impl Default for HandConfig {
             press_n: 4.5,
             unsteadiness: 1.0,
             mishaps: true,
+            turn_deg: 0.0,
+            lean_deg: 0.0,
         }
     }
 }
@@ -218,7 +224,9 @@ impl Hand {
         let (place, turn) = self.habits.at(self.clock_s);
         let u = self.config.unsteadiness;
         let off = place * u + Vector3::new(0.0, 0.0, depth);
-        let wobble = Isometry3::from_parts(off.into(), UnitQuaternion::from_scaled_axis(turn * u));
+        let meant = UnitQuaternion::from_euler_angles(self.config.lean_deg.to_radians(), 0.0, 0.0);
+        let meant = UnitQuaternion::from_euler_angles(0.0, 0.0, self.config.turn_deg.to_radians()) * meant;
+        let wobble = Isometry3::from_parts(off.into(), UnitQuaternion::from_scaled_axis(turn * u) * meant);
         // FRAMES: the probe as the hand means to hold it, written in the ideal probe of the course.
         self.course.at(self.at_m) * Pose::assume(wobble)
     }

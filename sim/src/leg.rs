@@ -42,6 +42,10 @@ pub struct LegConfig {
     pub variation: f64,
     /// Whether a femoral vein runs beside the artery.
     pub vein: bool,
+    /// How much lies between its lumen and the artery's (m): 0.8 mm is the artery's wall alone. Their middles are
+    /// 11.5 mm apart when this is not said.
+    #[serde(default)]
+    pub vein_gap_m: Option<f64>,
 }
 
 impl Default for LegConfig {
@@ -52,6 +56,7 @@ impl Default for LegConfig {
             stenoses: vec![stenosis(0.050, 0.75), stenosis(0.100, 0.60), stenosis(0.210, 0.50)],
             variation: 1.0,
             vein: false,
+            vein_gap_m: None,
         }
     }
 }
@@ -77,7 +82,7 @@ impl Leg {
         let course = arteries::Course::new(&skin, config.side.sign(), &mut chance);
         let (main, bifurcation_m) = arteries::main(&course, &config.stenoses);
         let deep = arteries::deep(&main, bifurcation_m, config.side.sign());
-        let vein = config.vein.then(|| arteries::vein(&main, config.side.sign()));
+        let vein = config.vein.then(|| arteries::vein(&main, config.side.sign(), config.vein_gap_m));
         Self { side: config.side, skin, arteries: vec![main, deep], bifurcation_m, vein }
     }
 

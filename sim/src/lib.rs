@@ -32,6 +32,7 @@
 //! What it does not do: know any algorithm under test. It leans on none, and its truth goes to tests and reports only.
 
 mod arm;
+mod case;
 mod cell;
 pub mod controller;
 mod disturbance;
@@ -51,6 +52,7 @@ mod ultrasound;
 mod vessel;
 
 pub use arm::{KinematicError, SensorConfig, SimulatedArm, ToolConfig};
+pub use case::Case;
 pub use cell::{
     ArmConfig, ArmKind, CellConfig, CellError, MachineConfig, Moment, Nominal, SimulatedCell, SimulatedHand,
     SubjectConfig, TICK, Touch, Truth, Window,
@@ -65,5 +67,7 @@ pub use skin::{HALF_FACE_X_M, HALF_FACE_Y_M, SkinConfig, Surface};
 pub use subject::Subject;
 pub use tank::{Bench, WirePhantomConfig, WireTank};
 pub use tissue::{ASSUMED_M_S, Facet, Homogeneous, Medium, Reflector, Strand, Tissue};
-pub use ultrasound::{Contact, DoubleEcho, ImagingConfig, ImagingError, Overlay, Renderer, Shadow, settings};
+pub use ultrasound::{
+    Contact, DoubleEcho, ImagingConfig, ImagingError, Overlay, Renderer, Reverberation, Shadow, settings,
+};
 pub use vessel::{Calibre, Segment, SegmentName, Stenosis, SurfaceGrid, Vessel};

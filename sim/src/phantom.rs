@@ -23,6 +23,12 @@ pub struct PhantomConfig {
     pub depth_m: f64,
     /// Width of the block across the vessel, and its height (m).
     pub block_m: [f64; 2],
+    /// How far the vessel's middle is bowed out of the straight line through its ends: sideways, and down (m).
+    #[serde(default)]
+    pub bow_m: [f64; 2],
+    /// A vein runs beside the vessel, with so much between the two lumens (m): 0.8 mm is the artery's wall alone.
+    #[serde(default)]
+    pub vein_gap_m: Option<f64>,
 }
 
 impl Default for PhantomConfig {
@@ -36,17 +42,27 @@ impl Default for PhantomConfig {
             straight_m: 0.040,
             depth_m: 0.034,
             block_m: [0.100, 0.080],
+            bow_m: [0.0, 0.0],
+            vein_gap_m: None,
         }
     }
 }
 
 /// A block on the table (its bottom at y = 0, its top flat), the vessel's axis along -z through x = 0, from
-/// `z = length / 2` down to `-length / 2`.
+/// `z = length / 2` down to `-length / 2`; bowed, if at all, as an arc of a sine.
 #[derive(Clone, Debug)]
 pub struct VascularPhantom {
     config: PhantomConfig,
     vessels: Vec<Vessel>,
+    vein: Option<Vessel>,
+    /// Half the block's length (m): the vessel's ends are on its faces.
+    half_length_m: f64,
 }
+
+/// Radius of the vein (m).
+const VEIN_RADIUS_M: f64 = 4.0e-3;
+/// Points that a bowed axis is drawn through.
+const BOW_POINTS: usize = 25;
 
 impl VascularPhantom {
     /// The phantom with these numbers.
@@ -60,10 +76,29 @@ impl VascularPhantom {
             area_fraction,
         });
         let y = config.depth_m - config.block_m[1];
-        let ends = [Point::new(0.0, y, length / 2.0), Point::new(0.0, y, -length / 2.0)];
-        let calibre = Calibre::constant(config.diameter_m / 2.0);
-        let vessel = Vessel::new(&ends, calibre, stenoses.collect(), Vec::new());
-        Self { config: config.clone(), vessels: vec![vessel] }
+        let axis = |aside: f64| -> Vec<Point<World>> {
+            let straight = config.bow_m.iter().all(|bow| bow.abs() < 1e-9);
+            let last = if straight { 1 } else { BOW_POINTS - 1 };
+            (0..=last)
+                .map(|i| {
+                    let t = i as f64 / last as f64;
+                    let [x, down] = config.bow_m.map(|bow| bow * (std::f64::consts::PI * t).sin());
+                    Point::new(aside + x, y + down, length * (0.5 - t))
+                })
+                .collect()
+        };
+        let radius = config.diameter_m / 2.0;
+        let vessel = Vessel::new(&axis(0.0), Calibre::constant(radius), stenoses.collect(), Vec::new());
+        let vein = config.vein_gap_m.map(|gap| {
+            let beside = axis(radius + gap + VEIN_RADIUS_M);
+            Vessel::new(&beside, Calibre::constant(VEIN_RADIUS_M), Vec::new(), Vec::new())
+        });
+        Self { config: config.clone(), vessels: vec![vessel], vein, half_length_m: length / 2.0 }
+    }
+
+    /// The vein, when it has one.
+    pub const fn vein(&self) -> Option<&Vessel> {
+        self.vein.as_ref()
     }
 
     /// The vessel; its arc length begins at the superior end.
@@ -85,7 +120,7 @@ impl VascularPhantom {
     pub fn surface(&self, point: Point<World>) -> (f64, Direction<World>) {
         let p = point.vector();
         let [width, height] = self.config.block_m;
-        let half_length = self.vessel().length_m() / 2.0;
+        let half_length = self.half_length_m;
         let (x, y, z) = (Direction::x(), Direction::y(), Direction::z());
         let faces = [
             (-p.y - height, y.reversed()),
@@ -110,6 +145,10 @@ impl VascularPhantom {
 impl Tissue for VascularPhantom {
     fn artery(&self, point: Point<World>) -> f64 {
         self.vessels[0].wall_distance(point)
+    }
+
+    fn vein(&self, point: Point<World>) -> Option<f64> {
+        self.vein.as_ref().map(|vein| vein.wall_distance(point))
     }
 }
 
@@ -144,5 +183,33 @@ mod tests {
         assert!(phantom.surface(Point::new(0.01, phantom.top_y() + 0.003, 0.02)).0 + 0.003 < 1e-12);
         let corner = Point::new(0.053, phantom.top_y() - 0.004, 0.0);
         assert!((phantom.surface(corner).0 - 0.005).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_bowed_vessel_has_the_same_stenoses_along_its_own_arc() {
+        let config = PhantomConfig { bow_m: [0.010, 0.003], ..PhantomConfig::default() };
+        let (bowed, straight) =
+            (VascularPhantom::new(&config), VascularPhantom::new(&PhantomConfig::default()));
+        let (ours, theirs) = (bowed.vessel(), straight.vessel());
+        assert_eq!(ours.stenoses(), theirs.stenoses());
+        assert!(ours.length_m() > theirs.length_m() + 1e-3);
+        let middle = ours.centre(ours.length_m() / 2.0).vector();
+        assert!(
+            (middle.x - 0.010).abs() < 1e-5
+                && (middle.y - theirs.centre(0.0).vector().y - 0.003).abs() < 1e-5
+        );
+        // The block is as long as it was.
+        let beyond = Point::new(0.0, -0.03, theirs.length_m() / 2.0 + 0.004);
+        assert!((bowed.surface(beyond).0 - straight.surface(beyond).0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_vein_leaves_the_gap_that_was_asked_for() {
+        let config = PhantomConfig { vein_gap_m: Some(0.8e-3), ..PhantomConfig::default() };
+        let phantom = VascularPhantom::new(&config);
+        let wall = Point::new(3.935e-3, phantom.vessel().centre(0.0).vector().y, 0.0);
+        let nearest = Tissue::vein(&phantom, wall).unwrap();
+        assert!((nearest - 0.8e-3).abs() < 1e-9, "{nearest}");
+        assert!(Tissue::vein(&VascularPhantom::new(&PhantomConfig::default()), wall).is_none());
     }
 }

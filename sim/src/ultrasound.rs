@@ -15,7 +15,7 @@ use probepath_frames::{Image, Pose, World};
 use probepath_us_capture::Setting;
 use rayon::prelude::*;
 
-pub use config::{Contact, DoubleEcho, ImagingConfig, ImagingError, Overlay, Shadow};
+pub use config::{Contact, DoubleEcho, ImagingConfig, ImagingError, Overlay, Reverberation, Shadow};
 use settings::{COLUMNS, ROWS};
 
 use crate::tissue::{Medium, Tissue};

@@ -1,22 +1,22 @@
 //! What only a simulation knows: how far a reconstruction is from the lumen that was truly there. Asked after the
 //! reconstruction has given its answer; nothing here flows back into it.
 
-use probepath_recon::{Fit, LumenReconstruction, Mesh, compare};
+mod gold;
+mod sections;
+
+use probepath_recon::{Fit, LumenReconstruction, compare};
 use probepath_sim::{SimulatedCell, Truth, Vessel};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::Calibrated;
 use super::calibrate::apart;
 use crate::report::SurfaceError;
+pub use sections::SectionError;
 
 /// How much true surface lies beyond the reconstructed one at both ends (m), so that no end is compared with an edge.
 const BEYOND_M: f64 = 0.015;
-/// Distance of the true surface's rings (m), and points in each.
-const RING_M: f64 = 0.0005;
-const AROUND: usize = 72;
-
 /// A true stenosis beside the one that was found there.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StenosisError {
     /// Lost area in truth (percent).
     pub true_percent_area: f64,
@@ -36,9 +36,7 @@ pub(super) fn surface_error(truth: &Truth, recon: &LumenReconstruction) -> Optio
 fn error_map(truth: &Truth, recon: &LumenReconstruction) -> Option<Vec<f64>> {
     let vessel = truth.subject().main()?;
     let (from, until) = reach(vessel, recon)?;
-    let rings = (((until - from) / RING_M).ceil() as usize).max(2);
-    let grid = vessel.surface(from..until, rings, AROUND);
-    let gold = Mesh::tube(&grid.points, (grid.along, grid.around));
+    let gold = gold::gold(truth.subject().vessels(), from..until);
     let surface = &recon.surface;
     let compared = compare(&surface.mesh(), &gold, Fit::Near).ok()?;
     let rows = compared.error_mm.chunks(surface.around).zip(&surface.measured);
@@ -51,6 +49,11 @@ fn reach(vessel: &Vessel, recon: &LumenReconstruction) -> Option<(f64, f64)> {
     let ends = [recon.centreline.at(0.0)?, recon.centreline.at(recon.centreline.length_m())?];
     let [a, b] = ends.map(|end| vessel.nearest(end.point));
     Some(((a.min(b) - BEYOND_M).max(0.0), (a.max(b) + BEYOND_M).min(vessel.length_m())))
+}
+
+/// Every measured section beside the true one.
+pub(super) fn sections(truth: &Truth, recon: &LumenReconstruction) -> Vec<SectionError> {
+    sections::sections(truth.subject().vessels(), recon)
 }
 
 /// Every true stenosis that lies whole inside the reconstruction, beside what was found.

@@ -9,7 +9,10 @@ use probepath_teach_replay::Path as Taught;
 use super::ValidateError;
 use crate::progress::Progress;
 use crate::protocol::Protocol;
-use crate::session::{CellFile, Opening, Scan, ScanWish, Session, SessionError, TeachWish};
+use crate::session::{
+    Calibrated, CellFile, Opening, Scan, ScanWish, Session, SessionError, TeachWish, VisitWish,
+};
+use probepath_us_capture::plan::VisitOptions;
 
 /// One taught and scanned seed.
 pub(super) struct Bench {
@@ -38,13 +41,33 @@ pub(super) fn taught(
     (operator, progress): (Operator, Arc<dyn Progress>),
 ) -> Result<(Session, Taught), ValidateError> {
     let wrong = |source: SessionError| ValidateError::Session { seed, source };
-    let protocol = Protocol { name: "validate".into(), text: String::new() };
-    let (cell, out) = (cell.clone(), out.to_owned());
-    let mut session = Session::open(Opening { cell, seed, out, protocol, date: None, operator, progress })
-        .map_err(wrong)?;
+    let mut session = open(cell, seed, out, (operator, progress)).map_err(wrong)?;
     let path =
         session.teach(&TeachWish { study: "VALIDATE".into(), ..TeachWish::default() }).map_err(wrong)?;
     Ok((session, path))
+}
+
+/// A session of one seed in a folder of its own.
+pub(super) fn open(
+    cell: &CellFile,
+    seed: u64,
+    out: &Path,
+    (operator, progress): (Operator, Arc<dyn Progress>),
+) -> Result<Session, SessionError> {
+    let protocol = Protocol { name: "validate".into(), text: String::new() };
+    let (cell, out) = (cell.clone(), out.to_owned());
+    Session::open(Opening { cell, seed, out, protocol, date: None, operator, progress })
+}
+
+/// What `library/calibrate.rhai` does.
+pub(super) fn calibrated_on_the_bench(session: &mut Session) -> Result<Calibrated, SessionError> {
+    let located = session.phantom_as_measured()?;
+    let options = VisitOptions { clearance_m: 12e-3, ..VisitOptions::default() };
+    let plan = session.plan_calibration(&located, &options)?;
+    let images = session.visit(&plan.stops, &VisitWish::default())?;
+    let others = session.visit(&plan.others, &VisitWish::default())?;
+    let calibrated = session.calibrate(&images, &Default::default())?;
+    session.check_calibration(&calibrated, &others)
 }
 
 /// A folder for the exams of a validation, gone when it is done.

@@ -6,13 +6,11 @@ use std::sync::Arc;
 
 use probepath_robot::Operator;
 use probepath_sim::Window;
-use probepath_us_capture::plan::VisitOptions;
 
-use super::bench::{Folder, tell};
+use super::bench::{Folder, calibrated_on_the_bench, tell};
 use super::{Goal, Goals, ValidateError};
 use crate::progress::Progress;
-use crate::protocol::Protocol;
-use crate::session::{Calibrated, CalibrationTruth, CellFile, Opening, Session, SessionError, VisitWish};
+use crate::session::{Calibrated, CalibrationTruth, CellFile, Session, SessionError};
 
 /// One setting of Table I.
 struct Row {
@@ -105,7 +103,7 @@ struct Figures {
 impl Figures {
     fn add(&mut self, setting: &Row, seed: u64, out: &Path) -> Result<(), SessionError> {
         let mut session = open(setting, seed, out)?;
-        let calibrated = calibrate(&mut session)?;
+        let calibrated = calibrated_on_the_bench(&mut session)?;
         let truth: Option<CalibrationTruth> = session.calibration_error(&calibrated);
         session.close()?;
         let truth = truth.ok_or(SessionError::Order("only a simulated cell knows the truth"))?;
@@ -144,26 +142,7 @@ fn open(setting: &Row, seed: u64, out: &Path) -> Result<Session, SessionError> {
     machine.window = setting.window;
     // The machine stamps its images up to 40 ms early or late, and nobody has told.
     cell.simulated.knobs.machine.unknown_latency_ms = (seed.wrapping_mul(37) % 81) as f64 - 40.0;
-    Session::open(Opening {
-        cell,
-        seed,
-        out: out.to_owned(),
-        protocol: Protocol { name: "validate".into(), text: String::new() },
-        date: None,
-        operator: Operator::new(),
-        progress: Arc::new(()),
-    })
-}
-
-/// What `library/calibrate.rhai` does.
-fn calibrate(session: &mut Session) -> Result<Calibrated, SessionError> {
-    let located = session.phantom_as_measured()?;
-    let options = VisitOptions { clearance_m: 12e-3, ..VisitOptions::default() };
-    let plan = session.plan_calibration(&located, &options)?;
-    let images = session.visit(&plan.stops, &VisitWish::default())?;
-    let others = session.visit(&plan.others, &VisitWish::default())?;
-    let calibrated = session.calibrate(&images, &Default::default())?;
-    session.check_calibration(&calibrated, &others)
+    super::bench::open(&cell, seed, out, (Operator::new(), Arc::new(())))
 }
 
 /// `sqrt( (1/MN) sum (dx² + dy²) )` (FIELD.md section 2, for [P1] eq. 5) of six wires (or as many as a small window

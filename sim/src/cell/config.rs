@@ -221,6 +221,8 @@ impl CellConfig {
         within("hand.speed_mm_s", hand.speed_mm_s, 1.0, 250.0)?;
         within("hand.press_n", hand.press_n, 0.5, 30.0)?;
         within("hand.unsteadiness", hand.unsteadiness, 0.0, 10.0)?;
+        within("hand.turn_deg", hand.turn_deg, -45.0, 45.0)?;
+        within("hand.lean_deg", hand.lean_deg, -15.0, 15.0)?;
         for (field, value, low, high) in self.disturbance.numbers() {
             within(field, value, low, high)?;
         }

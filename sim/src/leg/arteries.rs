@@ -133,14 +133,15 @@ pub(super) fn deep(main: &Vessel, branch_m: f64, sign: f64) -> Vessel {
     Vessel::new(&points, Calibre::constant(DFA_RADIUS_M), Vec::new(), segments)
 }
 
-/// The femoral vein: medial of the artery at the groin, behind it further down.
-pub(super) fn vein(main: &Vessel, sign: f64) -> Vessel {
+/// The femoral vein: medial of the artery at the groin, behind it further down; `gap_m` between their lumens.
+pub(super) fn vein(main: &Vessel, sign: f64, gap_m: Option<f64>) -> Vessel {
     let steps = 14;
     let points: Vec<_> = (0..=steps)
         .map(|i| {
             let fraction = f64::from(i) / f64::from(steps);
             let turn = 1.4 * fraction;
-            let apart = 0.0115;
+            let artery_m = main.free_radius(main.length_m() * fraction);
+            let apart = gap_m.map_or(0.0115, |gap| artery_m + gap + VEIN_RADIUS_M);
             let aside = Vector3::new(-sign * turn.cos() * apart, turn.sin() * apart, 0.0);
             Point::from_vector(main.centre(main.length_m() * fraction).vector() + aside)
         })

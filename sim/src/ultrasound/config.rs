@@ -55,6 +55,8 @@ pub struct ImagingConfig {
     pub face_specular_deg: f64,
     /// How unevenly a wire echoes along its length: standard deviation (dB), over about a millimetre.
     pub wire_uneven_db: f64,
+    /// Echoes of the skin that run to and fro under the probe.
+    pub reverberation: Option<Reverberation>,
     /// A second echo behind that of every wire.
     pub double_echo: Option<DoubleEcho>,
     /// What the machine writes over its picture.
@@ -68,6 +70,18 @@ pub struct DoubleEcho {
     /// How far behind the first it shows (m).
     pub behind_m: f64,
     /// How much weaker it is (dB).
+    pub loss_db: f64,
+}
+
+/// Bright bands across the whole picture, as far from one another as the skin's layers are thick.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Reverberation {
+    /// From one band to the next (m); the first lies so deep.
+    pub every_m: f64,
+    /// Amplitude of the first (dB re an echogenicity of one).
+    pub first_db: f64,
+    /// How much weaker each is than the one before (dB).
     pub loss_db: f64,
 }
 
@@ -147,6 +161,7 @@ impl Default for ImagingConfig {
             wire_specular_deg: 12.0,
             face_specular_deg: 6.0,
             wire_uneven_db: 1.0,
+            reverberation: None,
             double_echo: None,
             overlay: Overlay::default(),
         }
@@ -211,6 +226,11 @@ impl ImagingConfig {
         within("wire_specular_deg", self.wire_specular_deg, 1.0, 90.0)?;
         within("face_specular_deg", self.face_specular_deg, 1.0, 90.0)?;
         within("wire_uneven_db", self.wire_uneven_db, 0.0, 20.0)?;
+        if let Some(bands) = self.reverberation {
+            within("reverberation.every_m", bands.every_m, 0.5e-3, 50e-3)?;
+            within("reverberation.first_db", bands.first_db, -120.0, 40.0)?;
+            within("reverberation.loss_db", bands.loss_db, 0.1, 60.0)?;
+        }
         let Some(double) = self.double_echo else { return Ok(()) };
         within("double_echo.behind_m", double.behind_m, 0.0, 20e-3)?;
         within("double_echo.loss_db", double.loss_db, 0.0, 120.0)

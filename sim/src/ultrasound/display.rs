@@ -2,7 +2,7 @@
 
 use probepath_us_capture::Setting;
 
-use super::config::{Contact, ImagingConfig};
+use super::config::{Contact, ImagingConfig, Reverberation};
 use super::grid::Grid;
 use super::hash;
 use crate::tissue::Medium;
@@ -118,7 +118,7 @@ impl Gains {
             noise: (0..rows)
                 .map(|row| ratio(config.noise_db - config.tgc_most_db + made_up(row)) as f32)
                 .collect(),
-            face: (0..rows).map(|row| face(depth(row))).collect(),
+            face: (0..rows).map(|row| face(depth(row), config.reverberation.as_ref())).collect(),
             coupling: (0..grid.shown).map(|node| contact.coupling(place(node)) as f32).collect(),
             shadows: shadows.collect(),
         }
@@ -136,10 +136,15 @@ impl Gains {
 }
 
 /// In contact the face shows as one bright line. In air its echo runs to and fro in the lens: bars 0.8 mm apart, each
-/// 6 dB below the last.
-fn face(depth_m: f64) -> [f32; 2] {
+/// 6 dB below the last. Behind contact the skin's layers may ring as well.
+fn face(depth_m: f64, ringing: Option<&Reverberation>) -> [f32; 2] {
     let bar = |at: f64, sigma: f64| (-0.5 * ((depth_m - at) / sigma).powi(2)).exp();
     let air: f64 =
         (0..14).map(|n| 6.0 * ratio(-6.0 * f64::from(n)) * bar(0.8e-3 * f64::from(n), 0.18e-3)).sum();
-    [(2.0 * bar(0.0, 0.25e-3)) as f32, air as f32]
+    let rings: f64 = ringing.map_or(0.0, |bands| {
+        let nearest = (depth_m / bands.every_m).round().max(1.0);
+        let amplitude = ratio(bands.first_db - (nearest - 1.0) * bands.loss_db);
+        amplitude * bar(nearest * bands.every_m, 0.25e-3)
+    });
+    [(2.0 * bar(0.0, 0.25e-3) + rings) as f32, air as f32]
 }
