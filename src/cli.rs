@@ -77,6 +77,13 @@ pub struct Reconstruct {
     /// Build the volume too.
     #[arg(long)]
     pub volume: bool,
+    /// A program that finds the lumen in the place of probepath's own finder (a .py is run with Python): it gets images
+    /// and answers contours. docs/reconstruction.md says how.
+    #[arg(long, value_name = "PROGRAM")]
+    pub lumen: Option<PathBuf>,
+    /// How long that program may take for one image.
+    #[arg(long, value_name = "S", default_value_t = 30.0, requires = "lumen")]
+    pub lumen_seconds: f64,
     /// Folder for what is made.
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,

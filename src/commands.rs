@@ -42,8 +42,9 @@ fn arm(args: crate::cli::Arm) -> Outcome {
 }
 
 fn reconstruct(args: crate::cli::Reconstruct, screen: &Screen) -> Outcome {
-    let crate::cli::Reconstruct { input, calibration, volume, out } = args;
-    let wish = offline::ReconstructWish { input, calibration, volume, out };
+    let crate::cli::Reconstruct { input, calibration, volume, lumen, lumen_seconds, out } = args;
+    let lumen = lumen.map(|program| offline::FinderWish { program, seconds: lumen_seconds });
+    let wish = offline::ReconstructWish { input, calibration, volume, lumen, out };
     Ok(Document::of(&offline::reconstruct(&wish, &*screen.progress())?)?)
 }
 

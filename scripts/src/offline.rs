@@ -14,6 +14,7 @@ pub use arm::{ArmAnswer, ArmError, ArmQuestion, arm};
 pub use compare::{CompareError, Comparison, compare};
 pub use convert::{ConvertError, Converted, convert};
 pub use reconstruct::{
-    ImagesOf, ReconstructError, ReconstructWish, Reconstructed, Timing, VolumeMade, reconstruct,
+    FinderFault, FinderWish, ImagesOf, ReconstructError, ReconstructWish, Reconstructed, Timing, VolumeMade,
+    reconstruct,
 };
 pub use simulate::{Served, ServedArm, SimulateError, SimulateRequest, Simulating, simulate};

@@ -65,6 +65,9 @@ pub enum NoLumen {
         /// What is wrong with it.
         what: &'static str,
     },
+    /// Whatever took the finder's place says that there is none.
+    #[error("the finder in the place of ours gave none")]
+    Declined,
     /// The fit of the wall did not settle.
     #[error("the fit of the wall did not settle")]
     Unsettled,
@@ -83,6 +86,7 @@ impl NoLumen {
             Self::Radius { .. } => "radius out of range",
             Self::Jump { .. } => "away from its neighbours",
             Self::BadContour { .. } => "no closed contour",
+            Self::Declined => "none found",
             Self::Unsettled => "fit did not settle",
         }
     }

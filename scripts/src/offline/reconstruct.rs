@@ -2,6 +2,7 @@
 
 mod clip;
 mod error;
+mod finder;
 mod input;
 mod tables;
 mod volume;
@@ -11,13 +12,15 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use probepath_recon::{LumenReconstruction, ReconError, check_sweep, reconstruct_from, segment};
+use probepath_recon::{ImageLumen, LumenReconstruction, NoLumen, check_sweep, reconstruct_from, segment};
 use serde::Serialize;
 
 use crate::progress::Progress;
 use crate::report::build::{Ingredients, make};
 use crate::report::{Report, StenosisRow};
 pub use error::ReconstructError;
+use finder::LumenProcess;
+pub use finder::{FinderFault, FinderWish};
 use input::Input;
 pub use volume::VolumeMade;
 
@@ -30,6 +33,8 @@ pub struct ReconstructWish {
     pub calibration: Option<PathBuf>,
     /// Whether a volume is built as well.
     pub volume: bool,
+    /// A program that finds the lumen in the place of our own finder.
+    pub lumen: Option<FinderWish>,
     /// Folder for what is made.
     pub out: PathBuf,
 }
@@ -72,6 +77,19 @@ pub struct ImagesOf {
     pub refused: BTreeMap<String, usize>,
 }
 
+impl ImagesOf {
+    /// Another program's own words in the place of our one reason for them.
+    fn say_why(&mut self, declined: Declined) {
+        if declined.is_empty() {
+            return;
+        }
+        self.refused.remove(NoLumen::Declined.kind());
+        for (why, count) in declined {
+            *self.refused.entry(why).or_default() += count;
+        }
+    }
+}
+
 /// What each stage took (s, of the clock on the wall).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Timing {
@@ -101,20 +119,22 @@ pub fn reconstruct(
 ) -> Result<Reconstructed, ReconstructError> {
     let folder = |source| ReconstructError::Folder { path: wish.out.clone(), source };
     std::fs::create_dir_all(&wish.out).map_err(folder)?;
-    let begun = Instant::now();
-    let mut timing = Timing::default();
+    let (begun, mut timing) = (now(), Timing::default());
     progress.at("reading", 0.0);
     let input = timed(&mut timing.reading, || read(wish))?;
     progress.at("looking for the lumen", 0.2);
-    let found = lumen(&input, &mut timing);
+    let found = lumen(wish, &input, &mut timing);
     let mut made = Reconstructed::of(wish, &input);
     match found {
-        Ok(recon) => {
+        Ok((recon, declined)) => {
             progress.at("reporting", 0.7);
             timed(&mut timing.report, || made.write(wish, &input, &recon))?;
+            made.images.say_why(declined);
         }
-        Err(why) if wish.volume => made.notes.push(format!("no surface: {why}")),
-        Err(source) => return Err(ReconstructError::Lumen { path: wish.input.clone(), source }),
+        Err(ReconstructError::Lumen { source, .. }) if wish.volume => {
+            made.notes.push(format!("no surface: {source}"));
+        }
+        Err(other) => return Err(other),
     }
     if wish.volume {
         progress.at("building the volume", 0.8);
@@ -126,9 +146,15 @@ pub fn reconstruct(
     Ok(made)
 }
 
+/// What the clock on the wall says.
+#[allow(clippy::disallowed_methods, reason = "what a stage took is told to people; nothing depends on it")]
+fn now() -> Instant {
+    Instant::now()
+}
+
 /// Does it, and adds what it took.
 fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
-    let begun = Instant::now();
+    let begun = now();
     let done = work();
     *seconds += begun.elapsed().as_secs_f64();
     done
@@ -143,10 +169,24 @@ fn read(wish: &ReconstructWish) -> Result<Input, ReconstructError> {
     }
 }
 
-fn lumen(input: &Input, timing: &mut Timing) -> Result<LumenReconstruction, ReconError> {
-    check_sweep(&input.images, &input.lumen)?;
-    let lumens = timed(&mut timing.lumen, || segment(&input.images, &input.lumen));
-    timed(&mut timing.surface, || reconstruct_from(lumens, &input.lumen))
+/// The lumen of the sweep; and where another program found none, its reasons in its own words.
+fn lumen(wish: &ReconstructWish, input: &Input, timing: &mut Timing) -> Result<Found, ReconstructError> {
+    let wrong = |source| ReconstructError::Lumen { path: wish.input.clone(), source };
+    check_sweep(&input.images, &input.lumen).map_err(wrong)?;
+    let (lumens, declined) = timed(&mut timing.lumen, || in_each_image(wish, input))?;
+    let recon = timed(&mut timing.surface, || reconstruct_from(lumens, &input.lumen));
+    Ok((recon.map_err(wrong)?, declined))
+}
+
+/// What was found, and why another program found none, counted.
+type Found = (LumenReconstruction, Declined);
+type Declined = BTreeMap<String, usize>;
+
+fn in_each_image(wish: &ReconstructWish, input: &Input) -> Result<(Vec<ImageLumen>, Declined), FinderFault> {
+    match &wish.lumen {
+        None => Ok((segment(&input.images, &input.lumen), Declined::new())),
+        Some(program) => LumenProcess::start(program, input.lumen.dynamic_range_db)?.all(&input.images),
+    }
 }
 
 impl Reconstructed {

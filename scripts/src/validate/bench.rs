@@ -5,33 +5,12 @@ use std::sync::Arc;
 
 use probepath_robot::Operator;
 use probepath_teach_replay::Path as Taught;
+use probepath_us_capture::plan::VisitOptions;
 
 use super::ValidateError;
 use crate::progress::Progress;
 use crate::protocol::Protocol;
-use crate::session::{
-    Calibrated, CellFile, Opening, Scan, ScanWish, Session, SessionError, TeachWish, VisitWish,
-};
-use probepath_us_capture::plan::VisitOptions;
-
-/// One taught and scanned seed.
-pub(super) struct Bench {
-    pub(super) session: Session,
-    pub(super) scan: Scan,
-}
-
-/// Teaches and scans one seed in a folder of its own.
-pub(super) fn taught_and_scanned(
-    cell: &CellFile,
-    seed: u64,
-    wish: &ScanWish,
-    out: &Path,
-) -> Result<Bench, ValidateError> {
-    let wrong = |source: SessionError| ValidateError::Session { seed, source };
-    let (mut session, path) = taught(cell, seed, out, (Operator::new(), Arc::new(())))?;
-    let scan = session.scan(&path, wish).map_err(wrong)?;
-    Ok(Bench { session, scan })
-}
+use crate::session::{Calibrated, CellFile, Opening, Session, SessionError, TeachWish, VisitWish};
 
 /// Teaches one seed in a folder of its own; with an operator, and who hears of the progress.
 pub(super) fn taught(

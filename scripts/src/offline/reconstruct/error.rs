@@ -10,6 +10,7 @@ use probepath_us_capture::sequence::{NoChain, SequenceError};
 use probepath_us_capture::{BadBScan, BadCalibration, BadPixelMap};
 use thiserror::Error;
 
+use super::FinderFault;
 use crate::report::build::ReportError;
 
 /// What cannot be reconstructed.
@@ -53,6 +54,9 @@ pub enum ReconstructError {
         /// Why.
         source: ReconError,
     },
+    /// The program that finds lumens in the place of ours.
+    #[error(transparent)]
+    Finder(#[from] FinderFault),
     /// The report.
     #[error(transparent)]
     Report(#[from] ReportError),

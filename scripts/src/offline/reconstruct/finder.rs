@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, Command, Stdio};
+use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
@@ -108,9 +108,10 @@ impl LumenProcess {
 
     fn answered(&mut self, image: &PlacedBScan) -> Result<Answer, FinderFault> {
         let number = image.bscan.number;
-        let asked = self.questions.as_ref().is_some_and(|questions| {
-            questions.send((message::question(image), image.clone())).is_ok()
-        });
+        let asked = self
+            .questions
+            .as_ref()
+            .is_some_and(|questions| questions.send((message::question(image), image.clone())).is_ok());
         if !asked {
             return Err(self.died(number));
         }
@@ -139,13 +140,7 @@ impl LumenProcess {
     fn died(&mut self, number: u64) -> FinderFault {
         // It closed its output: it has gone, or is about to.
         self.questions = None;
-        let status = (0..50).find_map(|_| {
-            let status = self.child.try_wait().ok().flatten();
-            if status.is_none() {
-                thread::sleep(Duration::from_millis(20));
-            }
-            status
-        });
+        let status = gone(&mut self.child);
         let how = status.map_or_else(|| "it closed its output".into(), |status| status.to_string());
         FinderFault::Died { name: self.name.clone(), number, how, said: self.said() }
     }
@@ -174,18 +169,23 @@ impl Drop for LumenProcess {
     fn drop(&mut self) {
         // A program that was told all reads the end of its input and goes by itself; one that hangs does not.
         self.questions = None;
-        let gone = (0..25).any(|_| {
-            let gone = !matches!(self.child.try_wait(), Ok(None));
-            if !gone {
-                thread::sleep(Duration::from_millis(20));
-            }
-            gone
-        });
-        if !gone {
+        if gone(&mut self.child).is_none() {
             let _already_gone = self.child.kill();
             let _reaped = self.child.wait();
         }
     }
+}
+
+/// Its exit, when it comes within half a second.
+#[allow(clippy::disallowed_methods, reason = "another program's end is waited for; no arm and no test does")]
+fn gone(child: &mut Child) -> Option<ExitStatus> {
+    (0..50).find_map(|_| {
+        let status = child.try_wait().ok().flatten();
+        if status.is_none() {
+            thread::sleep(Duration::from_millis(10));
+        }
+        status
+    })
 }
 
 fn command(program: &Path) -> Command {

@@ -96,8 +96,12 @@ mod tests {
     use crate::session::{SectionError, StenosisError};
 
     fn good() -> Outcome {
-        let section =
-            |i: usize| SectionError { true_mm2: 48.0, found_mm2: 48.5, held: i % 20 != 0, centre_mm: 0.1 };
+        let section = |i: usize| SectionError {
+            true_mm2: 48.0,
+            found_mm2: 48.5,
+            held: !i.is_multiple_of(20),
+            centre_mm: 0.1,
+        };
         let found =
             |truth: f64| StenosisError { true_percent_area: truth, found_percent_area: Some(truth + 0.5) };
         Outcome {

@@ -58,7 +58,9 @@ pub enum FinderFault {
         source: std::io::Error,
     },
     /// What it answered is no answer.
-    #[error("the lumen finder {name} answered image {number} with what is no answer: {why}; it was: {answer}")]
+    #[error(
+        "the lumen finder {name} answered image {number} with what is no answer: {why}; it was: {answer}"
+    )]
     Nonsense {
         /// The program.
         name: String,
