@@ -7,7 +7,7 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::Vector3;
 use probepath_frames::{Point, World};
-use probepath_recon::volume::{Compounding, Slice, Sticks, Volume, VolumeSettings, Weights};
+use probepath_recon::volume::{Compounding, Holes, Slice, Sticks, Volume, VolumeSettings, Weights};
 use probepath_us_capture::PixelMap;
 
 const IMAGES: usize = 60;
@@ -32,7 +32,7 @@ fn volumes(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("volume of 640 x 480 images, 0.3 mm");
     group.sample_size(10).throughput(Throughput::Elements(IMAGES as u64));
     let plain = VolumeSettings::every_mm(0.3);
-    let sticks = Some(Sticks { longest: 9, at_least: 1 });
+    let sticks = Some(Holes::Sticks(Sticks { longest: 9, at_least: 1 }));
     for (name, settings) in [
         (
             "nearest, latest",

@@ -30,17 +30,25 @@ mod error;
 mod files;
 mod grid;
 mod holes;
+mod importance;
+mod memory;
 mod rows;
 mod settings;
+mod slab;
 mod slice;
 mod splat;
+mod strip;
+mod swept;
+mod tiles;
 
 pub use correlation::{Correlation, NotComparable};
 pub use error::VolumeError;
 pub use files::Layer;
 pub use grid::Grid;
-pub use settings::{Compounding, Region, Sticks, VolumeSettings, Weights};
+pub use importance::Importance;
+pub use settings::{Compounding, Holes, Region, Sticks, Swept, VolumeSettings, Weights};
 pub use slice::Slice;
+pub use tiles::Tiles;
 
 /// What is known of a voxel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -51,8 +59,13 @@ pub enum Mark {
     Unseen = 0,
     /// Pixels were put into it.
     Seen = 1,
-    /// A hole between seen voxels, filled from them.
+    /// A hole that was filled.
     Filled = 2,
+}
+
+impl Mark {
+    /// A grey level and a mark: what a voxel takes when it is done.
+    const BYTES: u64 = 2;
 }
 
 /// Grey levels on a grid in World (LPS, metres inside, millimetres in files), and what each is worth.
@@ -70,17 +83,24 @@ impl Volume {
     /// When there is no slice, the grid needs more memory than allowed, a slice is too far from the grid to count in
     /// voxels, or a voxel could take more pixels than can be summed exactly.
     pub fn build(slices: &[Slice<'_>], settings: &VolumeSettings) -> Result<Self, VolumeError> {
-        let grid = match &settings.grid {
-            Some(grid) => grid.clone(),
-            None => Grid::around(slices, settings)?,
-        };
-        settings.check(slices, &grid)?;
-        let (grey, marks) = splat::splat(slices, &grid, settings)?;
-        let mut volume = Self { grid, grey, marks };
-        if let Some(sticks) = settings.holes {
-            holes::fill(&mut volume, sticks);
-        }
-        Ok(volume)
+        let grid = settings.grid_for(slices)?;
+        let needs = settings.check(slices, &grid)?;
+        let layers = grid.size[2];
+        Ok(Tiles::of(slices, settings, grid, layers, needs)?.part(0..layers))
+    }
+
+    /// Nothing seen.
+    fn unseen(grid: Grid) -> Self {
+        let voxels = grid.voxels().unwrap_or(0);
+        Self { grid, grey: vec![0; voxels], marks: vec![Mark::Unseen; voxels] }
+    }
+
+    /// The layers of `grid`, which begins so many layers after this one.
+    fn only(&self, skip: usize, grid: Grid) -> Self {
+        let layer = grid.size[0] * grid.size[1];
+        let part = skip * layer..(skip + grid.size[2]) * layer;
+        let grey = self.grey.get(part.clone()).unwrap_or_default().to_vec();
+        Self { grid, grey, marks: self.marks.get(part).unwrap_or_default().to_vec() }
     }
 
     /// Where the voxels are.

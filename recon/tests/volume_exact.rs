@@ -4,7 +4,8 @@
 use nalgebra::Vector3;
 use probepath_frames::{Point, World};
 use probepath_recon::volume::{
-    Compounding, Grid, Mark, Region, Slice, Sticks, Volume, VolumeSettings, Weights,
+    Compounding, Grid, Holes, Importance, Mark, Region, Slice, Sticks, Swept, Tiles, Volume, VolumeSettings,
+    Weights,
 };
 use probepath_us_capture::PixelMap;
 use probepath_us_capture::plus::Rectangle;
@@ -83,14 +84,14 @@ fn hits(
     cases: &[Case],
     weights: Weights,
     voxel: [usize; 3],
-    used: impl Fn(usize, usize) -> bool,
+    importance: impl Fn(&Case, usize, usize) -> u64,
 ) -> Vec<(u64, u8)> {
     let mut hits = Vec::new();
     for case in cases {
         for (index, grey) in case.pixels.iter().enumerate() {
             let (column, row) = (index % case.width, index / case.width);
-            let weight = weight(weights, voxel, case.at(column, row));
-            if weight > 0 && used(column, row) {
+            let weight = weight(weights, voxel, case.at(column, row)) * importance(case, column, row);
+            if weight > 0 {
                 hits.push((weight, *grey));
             }
         }
@@ -109,6 +110,11 @@ fn compounded(hits: &[(u64, u8)], compounding: Compounding) -> Option<u8> {
             // Rounded to the nearest, a half up.
             Some(((2 * sum + total) / (2 * total)) as u8)
         }
+        Compounding::Median => {
+            let total: u128 = hits.iter().map(|h| u128::from(h.0)).sum();
+            let up_to = |grey: u8| hits.iter().filter(|h| h.1 <= grey).map(|h| u128::from(h.0)).sum::<u128>();
+            (0..=255).find(|grey| 2 * up_to(*grey) >= total)
+        }
     }
 }
 
@@ -117,14 +123,32 @@ fn voxels(size: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
     (0..nx * ny * nz).map(move |i| [i % nx, i / nx % ny, i / (nx * ny)])
 }
 
-const WAYS: [(Weights, Compounding); 6] = [
+const WAYS: [(Weights, Compounding); 8] = [
     (Weights::Nearest, Compounding::Mean),
     (Weights::Nearest, Compounding::Maximum),
     (Weights::Nearest, Compounding::Latest),
+    (Weights::Nearest, Compounding::Median),
     (Weights::Linear, Compounding::Mean),
     (Weights::Linear, Compounding::Maximum),
     (Weights::Linear, Compounding::Latest),
+    (Weights::Linear, Compounding::Median),
 ];
+
+const HOLES: [Holes; 2] =
+    [Holes::Swept(Swept { longest_m: 6.0 * SPACING_M }), Holes::Sticks(Sticks { longest: 6, at_least: 2 })];
+
+/// The volume in parts put together; `None` when not even a layer fits.
+fn parts(cases: &[Case], settings: &VolumeSettings) -> Option<(Vec<u8>, Vec<Mark>)> {
+    let slices: Vec<Slice<'_>> = cases.iter().map(Case::slice).collect();
+    let tiles = Tiles::new(&slices, settings).ok()?;
+    assert!(tiles.memory_bytes() <= settings.most_bytes);
+    let (mut grey, mut marks) = (Vec::new(), Vec::new());
+    for tile in tiles {
+        grey.extend(tile.grey());
+        marks.extend(tile.marks());
+    }
+    Some((grey, marks))
+}
 
 fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads").install(work)
@@ -138,7 +162,7 @@ proptest! {
         for (weights, compounding) in WAYS {
             let volume = build(&cases, &settings(size, weights, compounding));
             for voxel in voxels(size) {
-                let wanted = compounded(&hits(&cases, weights, voxel, |_, _| true), compounding);
+                let wanted = compounded(&hits(&cases, weights, voxel, |_, _, _| 1), compounding);
                 prop_assert_eq!(volume.at(voxel), wanted, "{:?} {:?} {:?}", weights, compounding, voxel);
             }
         }
@@ -151,14 +175,58 @@ proptest! {
         clip in [1_usize..9, 1_usize..7],
     ) {
         let region = Region { rectangle: Some(Rectangle { origin, size: clip }), fan: None };
-        let used = |column: usize, row: usize| {
-            (origin[0]..origin[0] + clip[0]).contains(&column) && (origin[1]..origin[1] + clip[1]).contains(&row)
+        let used = |_: &Case, column: usize, row: usize| {
+            let across = (origin[0]..origin[0] + clip[0]).contains(&column);
+            u64::from(across && (origin[1]..origin[1] + clip[1]).contains(&row))
         };
         let settings = VolumeSettings { region, ..settings(size, Weights::Linear, Compounding::Mean) };
         let volume = build(&cases, &settings);
         for voxel in voxels(size) {
             let wanted = compounded(&hits(&cases, Weights::Linear, voxel, used), Compounding::Mean);
             prop_assert_eq!(volume.at(voxel), wanted, "{:?}", voxel);
+        }
+    }
+}
+
+/// Tables of weights, some of them zero.
+fn importance() -> impl Strategy<Value = Importance> {
+    (1_usize..5, 1_usize..4).prop_flat_map(|(columns, rows)| {
+        let weight = prop_oneof![1 => Just(0), 1 => Just(255), 3 => any::<u8>()];
+        proptest::collection::vec(weight, columns * rows).prop_map(move |mut weights| {
+            weights[0] = weights[0].max(1);
+            Importance { columns, rows, weights }
+        })
+    })
+}
+
+proptest! {
+    #![proptest_config(seeded(400))]
+
+    #[test]
+    fn a_pixel_counts_what_its_place_in_the_image_and_its_own_weight_say(
+        (cases, size) in cases(),
+        table in importance(),
+        own in any::<bool>(),
+    ) {
+        // Any weights will do as an image's own; the grey levels are some.
+        let slices: Vec<Slice<'_>> = cases
+            .iter()
+            .map(|case| if own { case.slice().weighted(&case.pixels) } else { case.slice() })
+            .collect();
+        let counts = |case: &Case, column: usize, row: usize| {
+            let height = case.pixels.len() / case.width;
+            let cell = (row * table.rows / height) * table.columns + column * table.columns / case.width;
+            let (place, grey) = (u64::from(table.weights[cell]), u64::from(case.pixels[row * case.width + column]));
+            if own { (place * grey + 127) / 255 } else { place }
+        };
+        for (weights, compounding) in WAYS {
+            let settings = settings(size, weights, compounding);
+            let settings = VolumeSettings { importance: Some(table.clone()), ..settings };
+            let volume = Volume::build(&slices, &settings).expect("a volume");
+            for voxel in voxels(size) {
+                let wanted = compounded(&hits(&cases, weights, voxel, counts), compounding);
+                prop_assert_eq!(volume.at(voxel), wanted, "{:?} {:?} {:?}", weights, compounding, voxel);
+            }
         }
     }
 }
@@ -218,7 +286,7 @@ proptest! {
         let sticks = Sticks { longest, at_least };
         let open = settings(size, Weights::Nearest, Compounding::Mean);
         let bare = build(&cases, &open);
-        let filled = build(&cases, &VolumeSettings { holes: Some(sticks), ..open });
+        let filled = build(&cases, &VolumeSettings { holes: Some(Holes::Sticks(sticks)), ..open });
         for voxel in voxels(size) {
             let index = bare.grid().index(voxel).expect("inside");
             let (before, after) = (bare.marks()[index], filled.marks()[index]);
@@ -237,13 +305,22 @@ proptest! {
     }
 
     #[test]
-    fn a_volume_does_not_depend_on_the_number_of_threads((cases, size) in cases()) {
-        let size = [size[0], size[1], 3 * size[2]];
+    fn a_volume_depends_neither_on_the_number_of_threads_nor_on_being_built_in_parts(
+        (cases, size) in cases(),
+        swept in any::<bool>(),
+        share in 0.1..1.0_f64,
+    ) {
+        let size = [size[0], size[1], 8 * size[2]];
+        let holes = if swept { HOLES[0] } else { HOLES[1] };
         for (weights, compounding) in WAYS {
-            let sticks = Some(Sticks { longest: 6, at_least: 2 });
-            let settings = VolumeSettings { holes: sticks, ..settings(size, weights, compounding) };
+            let settings = VolumeSettings { holes: Some(holes), ..settings(size, weights, compounding) };
             let [one, three] = [1, 3].map(|threads| on_threads(threads, || build(&cases, &settings)));
             prop_assert!(one == three, "{:?} {:?}", weights, compounding);
+            let most_bytes = (settings.memory_bytes(one.grid()) as f64 * share) as u64;
+            let parts = on_threads(2, || parts(&cases, &VolumeSettings { most_bytes, ..settings }));
+            if let Some((grey, marks)) = parts {
+                prop_assert!(grey == one.grey() && marks == one.marks(), "{:?} {:?}", weights, compounding);
+            }
         }
     }
 }

@@ -6,7 +6,9 @@ use std::process::Command;
 
 use nalgebra::Vector3;
 use probepath_frames::{Point, World};
-use probepath_recon::volume::{Compounding, Grid, Layer, Slice, Sticks, Volume, VolumeSettings, Weights};
+use probepath_recon::volume::{
+    Compounding, Grid, Holes, Layer, Slice, Sticks, Volume, VolumeSettings, Weights,
+};
 use probepath_us_capture::PixelMap;
 use probepath_us_capture::sequence::{Format, Header, SequenceError};
 use proptest::prelude::*;
@@ -33,7 +35,7 @@ fn volume() -> impl Strategy<Value = Volume> {
                 grid: Some(grid),
                 weights: Weights::Linear,
                 compounding: Compounding::Mean,
-                holes: Some(Sticks { longest: 4, at_least: 1 }),
+                holes: Some(Holes::Sticks(Sticks { longest: 4, at_least: 1 })),
                 ..VolumeSettings::every_mm(1.0)
             };
             Volume::build(&[Slice::new(&pixels, 5, map)], &settings).expect("a volume")

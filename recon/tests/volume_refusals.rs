@@ -5,7 +5,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use nalgebra::Vector3;
 use probepath_frames::{Point, World};
 use probepath_recon::volume::{
-    Compounding, Grid, Mark, Region, Slice, Sticks, Volume, VolumeError, VolumeSettings, Weights,
+    Compounding, Grid, Holes, Importance, Mark, Region, Slice, Sticks, Swept, Volume, VolumeError,
+    VolumeSettings, Weights,
 };
 use probepath_us_capture::PixelMap;
 use probepath_us_capture::plus::{Fan, FanArc, Rectangle};
@@ -61,18 +62,28 @@ fn settings() -> impl Strategy<Value = VolumeSettings> {
     let spacing = move || [spacing(), spacing(), spacing()];
     let grid = (vector(), spacing(), [count(), count(), count()])
         .prop_map(|(origin, spacing_m, size)| Grid { origin: Point::from_vector(origin), spacing_m, size });
-    let sticks = (count(), count()).prop_map(|(longest, at_least)| Sticks { longest, at_least });
+    let sticks =
+        (count(), count()).prop_map(|(longest, at_least)| Holes::Sticks(Sticks { longest, at_least }));
+    let swept = length().prop_map(|longest_m| Holes::Swept(Swept { longest_m: 3.0 * longest_m }));
+    let holes = prop_oneof![sticks, swept];
+    let importance = (count(), count(), prop::collection::vec(any::<u8>(), 0..9))
+        .prop_map(|(columns, rows, weights)| Importance { columns, rows, weights });
     let weights = prop_oneof![Just(Weights::Nearest), Just(Weights::Linear)];
-    let compounding =
-        prop_oneof![Just(Compounding::Mean), Just(Compounding::Maximum), Just(Compounding::Latest)];
-    let options = (prop::option::of(grid), prop::option::of(sticks));
+    let compounding = prop_oneof![
+        Just(Compounding::Mean),
+        Just(Compounding::Maximum),
+        Just(Compounding::Latest),
+        Just(Compounding::Median),
+    ];
+    let options = (prop::option::of(grid), prop::option::of(holes), prop::option::weighted(0.05, importance));
     (spacing(), options, weights, compounding, region()).prop_map(
-        |(spacing_m, (grid, holes), weights, compounding, region)| VolumeSettings {
+        |(spacing_m, (grid, holes, importance), weights, compounding, region)| VolumeSettings {
             spacing_m,
             grid,
             weights,
             compounding,
             region,
+            importance,
             holes,
             most_bytes: 1 << 20,
         },

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use probepath_us_capture::plus::Fan;
 
-use super::Region;
+use super::{Importance, Region};
 
 /// Runs of columns for the rows of an image of one size.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -12,6 +12,10 @@ pub(super) struct Clip {
     pub(super) width: usize,
     pub(super) height: usize,
     runs: Vec<(usize, Range<usize>)>,
+    /// For every row the first of its runs, and the end of the last row's.
+    first: Vec<usize>,
+    /// Importance of every pixel, when they differ.
+    weights: Option<Vec<u8>>,
 }
 
 impl Clip {
@@ -24,8 +28,34 @@ impl Clip {
                 (within(r.origin[0], r.size[0], width), within(r.origin[1], r.size[1], height))
             }
         };
-        let runs = rows.flat_map(|row| runs_of(region.fan.as_ref(), columns.clone(), row)).collect();
-        Self { width, height, runs }
+        let runs: Vec<_> = rows.flat_map(|row| runs_of(region.fan.as_ref(), columns.clone(), row)).collect();
+        let first = (0..=height).map(|row| runs.partition_point(|(at, _)| *at < row)).collect();
+        Self { width, height, runs, first, weights: None }
+    }
+
+    /// With the importance of every pixel.
+    pub(super) fn weighted(self, importance: Option<&Importance>) -> Self {
+        let weights = importance.map(|table| table.over(self.width, self.height));
+        Self { weights, ..self }
+    }
+
+    /// The importance of some pixels.
+    pub(super) fn weights(&self, pixels: Range<usize>) -> Option<&[u8]> {
+        self.weights.as_ref()?.get(pixels)
+    }
+
+    /// Whether the pixel nearest to a place is used.
+    pub(super) fn holds(&self, column: f64, row: f64) -> bool {
+        let (column, row) = ((column + 0.5).floor(), (row + 0.5).floor());
+        if !(column >= 0.0 && row >= 0.0 && row < self.height as f64) {
+            return false;
+        }
+        let (column, row) = (column as usize, row as usize);
+        let runs = match (self.first.get(row), self.first.get(row + 1)) {
+            (Some(first), Some(end)) => self.runs.get(*first..*end).unwrap_or_default(),
+            _ => &[],
+        };
+        runs.iter().any(|(_, run)| run.contains(&column))
     }
 
     /// Rows with their runs, from the top.

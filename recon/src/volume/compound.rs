@@ -1,13 +1,72 @@
-//! What many pixels in one voxel become, as cells that pixels are added to and runs are merged into.
+//! What many pixels in one voxel become, as cells that runs of pixels are added to.
+
+mod tally;
+
+use std::ops::Range;
+
+pub(super) use tally::Tally;
+
+use super::strip::{Pixels, Strip};
 
 /// A cell of the volume while it is built. Its default is a voxel no pixel came to.
 pub(super) trait Cell: Copy + Default + Send + Sync {
+    /// How often all pixels are gone through.
+    const PASSES: usize = 1;
+    /// Whether sums up to each pixel of a row are wanted, so that a run costs the same however long it is.
+    const SUMS: bool = false;
+
     /// Adds one pixel; its weight is above zero.
     fn add(&mut self, weight: u64, grey: u8);
+
     /// Adds what a run of later pixels became.
-    fn merge(&mut self, run: &Self);
+    fn merge(&mut self, later: &Self);
+
     /// The grey level, when any pixel came.
     fn grey(&self) -> Option<u8>;
+
+    /// Between two passes.
+    fn next_pass(&mut self) {}
+
+    /// Adds the pixels of a run, each with its importance.
+    fn run(&mut self, pixels: &Pixels<'_>, _strip: &Strip, run: Range<usize>) {
+        for at in run {
+            let weight = u64::from(pixels.weight_at(at));
+            if weight > 0 {
+                self.add(weight, pixels.grey_at(at));
+            }
+        }
+    }
+
+    /// Adds the pixels of a run to the eight cells around them.
+    fn around(cells: &mut [Self], at: [usize; 8], pixels: &Pixels<'_>, strip: &Strip, run: Range<usize>) {
+        let mut runs = [Self::default(); 8];
+        for pixel in run {
+            let importance = u64::from(pixels.weight_at(pixel));
+            if importance == 0 {
+                continue;
+            }
+            for (cell, weight) in runs.iter_mut().zip(trilinear(strip.fraction(pixel))) {
+                if weight > 0 {
+                    cell.add(importance * weight, pixels.grey_at(pixel));
+                }
+            }
+        }
+        merge_at(cells, at, &runs);
+    }
+}
+
+fn merge_at<C: Cell>(cells: &mut [C], at: [usize; 8], runs: &[C; 8]) {
+    for (index, run) in at.into_iter().zip(runs) {
+        if let Some(cell) = cells.get_mut(index) {
+            cell.merge(run);
+        }
+    }
+}
+
+/// Trilinear weights of the eight voxels around, x fastest; they sum to 2^30.
+fn trilinear([x, y, z]: [u32; 3]) -> [u64; 8] {
+    let (x, y, z) = ([1024 - x, x], [1024 - y, y], [1024 - z, z]);
+    std::array::from_fn(|corner| u64::from(x[corner & 1]) * u64::from(y[corner >> 1 & 1] * z[corner >> 2]))
 }
 
 /// Sum and count in one word: 28 bits of count, 36 of sum.
@@ -30,33 +89,48 @@ pub(super) struct Brightest(u16);
 pub(super) struct Last(u16);
 
 impl Cell for CountedMean {
+    const SUMS: bool = true;
+
     fn add(&mut self, _weight: u64, grey: u8) {
         self.0 += (u64::from(grey) << 28) | 1;
     }
 
-    fn merge(&mut self, run: &Self) {
-        self.0 += run.0;
+    fn merge(&mut self, later: &Self) {
+        self.0 += later.0;
     }
 
     fn grey(&self) -> Option<u8> {
         let (sum, count) = (self.0 >> 28, self.0 & 0xFFF_FFFF);
         (sum + count / 2).checked_div(count).map(|g| g as u8)
     }
+
+    /// Only for pixels that count alike.
+    fn run(&mut self, _pixels: &Pixels<'_>, strip: &Strip, run: Range<usize>) {
+        let count = run.len() as u64;
+        self.0 += (u64::from(strip.greys(run)) << 28) | count;
+    }
 }
 
 impl Cell for WeightedMean {
+    const SUMS: bool = true;
+
     fn add(&mut self, weight: u64, grey: u8) {
         self.weights += weight;
         self.sum += weight * u64::from(grey);
     }
 
-    fn merge(&mut self, run: &Self) {
-        self.weights += run.weights;
-        self.sum += run.sum;
+    fn merge(&mut self, later: &Self) {
+        self.weights += later.weights;
+        self.sum += later.sum;
     }
 
     fn grey(&self) -> Option<u8> {
         (self.sum + self.weights / 2).checked_div(self.weights).map(|g| g as u8)
+    }
+
+    fn run(&mut self, _pixels: &Pixels<'_>, strip: &Strip, run: Range<usize>) {
+        self.weights += u64::from(strip.weights(run.clone()));
+        self.sum += u64::from(strip.greys(run));
     }
 }
 
@@ -65,8 +139,8 @@ impl Cell for Brightest {
         self.0 = self.0.max(u16::from(grey) + 1);
     }
 
-    fn merge(&mut self, run: &Self) {
-        self.0 = self.0.max(run.0);
+    fn merge(&mut self, later: &Self) {
+        self.0 = self.0.max(later.0);
     }
 
     fn grey(&self) -> Option<u8> {
@@ -79,9 +153,9 @@ impl Cell for Last {
         self.0 = u16::from(grey) + 1;
     }
 
-    fn merge(&mut self, run: &Self) {
-        if run.0 > 0 {
-            *self = *run;
+    fn merge(&mut self, later: &Self) {
+        if later.0 > 0 {
+            *self = *later;
         }
     }
 

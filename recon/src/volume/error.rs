@@ -50,6 +50,28 @@ pub enum VolumeError {
         /// Its columns.
         width: usize,
     },
+    /// Weights that do not fill their slice.
+    #[error("image {image} has {weights} weights for {pixels} pixels: it needs one for each")]
+    BadWeights {
+        /// Which slice.
+        image: usize,
+        /// Its weights.
+        weights: usize,
+        /// Its pixels.
+        pixels: usize,
+    },
+    /// A table of importance that is none.
+    #[error(
+        "an importance of {columns} x {rows} cells has {weights} weights: it needs one for each, not all zero"
+    )]
+    BadImportance {
+        /// Its columns.
+        columns: usize,
+        /// Its rows.
+        rows: usize,
+        /// Its weights.
+        weights: usize,
+    },
     /// Too far away to count in voxels.
     #[error("image {image} lies more than 2^29 voxels from the grid: its pose or the voxel size is wrong")]
     OffGrid {
@@ -61,5 +83,24 @@ pub enum VolumeError {
     TooDense {
         /// Pixels a voxel could take.
         hits: f64,
+    },
+    /// An image that cannot be cut.
+    #[error(
+        "a cut of {width} x {height} pixels is none: 1 to 2^28 of them, at a finite place, of a finite size"
+    )]
+    BadCut {
+        /// Its columns.
+        width: usize,
+        /// Its rows.
+        height: usize,
+    },
+    /// A live volume of medians.
+    #[error("the median looks at all images four times: build it when they are all there, or take the mean")]
+    NotLive,
+    /// Sweeps whose grey levels cannot be turned into amplitudes.
+    #[error("a dynamic range of {dynamic_range_db} dB is none: 20 to 120 dB are")]
+    BadRange {
+        /// The range that was given.
+        dynamic_range_db: f64,
     },
 }

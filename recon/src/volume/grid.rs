@@ -1,5 +1,7 @@
 //! Where the voxels are.
 
+use std::ops::Range;
+
 use nalgebra::Vector3;
 use probepath_frames::{Point, World};
 
@@ -18,6 +20,16 @@ pub struct Grid {
 }
 
 impl Grid {
+    /// Refuses a grid that is none.
+    pub(super) fn check(&self) -> Result<(), VolumeError> {
+        let positive = self.spacing_m.iter().all(|s| s.is_finite() && *s > 0.0);
+        if !positive || self.size.contains(&0) || self.origin.vector().iter().any(|x| !x.is_finite()) {
+            let spacing_mm = self.spacing_m.map(|s| s * 1e3);
+            return Err(VolumeError::BadGrid { size: self.size, spacing_mm });
+        }
+        Ok(())
+    }
+
     /// How many voxels; `None` when they cannot be counted.
     pub fn voxels(&self) -> Option<usize> {
         let [x, y, z] = self.size;
@@ -35,6 +47,12 @@ impl Grid {
         let [x, y, z] = voxel.map(|v| v as f64);
         let step = Vector3::from(self.spacing_m).component_mul(&Vector3::new(x, y, z));
         Point::from_vector(self.origin.vector() + step)
+    }
+
+    /// The part of the grid that these layers are.
+    pub(super) fn layers(&self, layers: &Range<usize>) -> Self {
+        let [nx, ny, _] = self.size;
+        Self { origin: self.centre([0, 0, layers.start]), size: [nx, ny, layers.len()], ..self.clone() }
     }
 
     /// A place counted in voxels from the first one's centre.

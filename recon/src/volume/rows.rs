@@ -29,17 +29,31 @@ pub(super) struct FixedRow {
 
 impl FixedMap {
     /// `None` when a corner is too far away. `half` adds half a voxel, so that flooring rounds.
+    ///
+    /// World's origin and the grid's are brought to whole numbers one by one: grids whose origins are whole voxels apart
+    /// then see the same places to the last bit.
     pub(super) fn of(slice: &Slice<'_>, grid: &Grid, half: bool) -> Option<Self> {
-        let first = grid.in_voxels(slice.map.at(0.0, 0.0).vector() - grid.origin.vector());
+        let (first, zero) =
+            (grid.in_voxels(slice.map.at(0.0, 0.0).vector()), grid.in_voxels(grid.origin.vector()));
         let (column, row) = (grid.in_voxels(slice.map.column_step()), grid.in_voxels(slice.map.row_step()));
         let (width, height) = (slice.width as f64, slice.height() as f64);
-        let corners =
-            [first, first + column * width, first + row * height, first + column * width + row * height];
-        if !corners.iter().all(|c| c.amax() < FARTHEST) {
+        let corners = [Vector3::zeros(), column * width, row * height, column * width + row * height];
+        let near = |v: &Vector3<f64>| v.amax() < FARTHEST;
+        if !(near(&first) && near(&zero) && corners.iter().all(|c| near(&(first - zero + c)))) {
             return None;
         }
-        let shift = if half { Vector3::repeat(0.5) } else { Vector3::zeros() };
-        Some(Self { origin: fixed(first + shift), column: fixed(column), row: fixed(row) })
+        let (first, zero) = (fixed(first), fixed(zero));
+        let shift = if half { 1 << (POINT - 1) } else { 0 };
+        let origin = [0, 1, 2].map(|axis| first[axis] - zero[axis] + shift);
+        Some(Self { origin, column: fixed(column), row: fixed(row) })
+    }
+
+    /// The voxels along an axis that an image of this size reaches, and one more on either side.
+    pub(super) fn span(&self, axis: usize, width: usize, height: usize) -> Range<i64> {
+        let (across, down) = (self.column[axis] * width as i64, self.row[axis] * height as i64);
+        let corners = [0, across, down, across + down].map(|c| (self.origin[axis] + c) >> POINT);
+        let [low, high] = [corners.iter().min(), corners.iter().max()].map(|end| end.copied().unwrap_or(0));
+        low - 1..high + 3
     }
 
     pub(super) fn row(&self, row: usize) -> FixedRow {
@@ -55,9 +69,9 @@ fn fixed(vector: Vector3<f64>) -> [i64; 3] {
 
 impl FixedRow {
     /// The columns of `run` whose voxel lies in the box, exactly.
-    pub(super) fn within(&self, run: Range<usize>, voxels: [Range<i64>; 3]) -> Range<usize> {
+    pub(super) fn within(&self, run: Range<usize>, voxels: &[Range<i64>; 3]) -> Range<usize> {
         let (mut low, mut high) = (run.start as i64, run.end as i64);
-        for (axis, range) in voxels.into_iter().enumerate() {
+        for (axis, range) in voxels.iter().enumerate() {
             let (from, to) = self.columns(axis, range);
             low = low.max(from);
             high = high.min(to);
@@ -66,7 +80,7 @@ impl FixedRow {
     }
 
     /// Columns u with `start <= floor(at + u * step) < end` along one axis.
-    fn columns(&self, axis: usize, range: Range<i64>) -> (i64, i64) {
+    fn columns(&self, axis: usize, range: &Range<i64>) -> (i64, i64) {
         let (at, step) = (self.at[axis], self.step[axis]);
         let (from, to) = ((range.start << POINT) - at, (range.end << POINT) - at);
         let ceil = |a: i64, b: i64| -((-a).div_euclid(b));
@@ -78,10 +92,51 @@ impl FixedRow {
         }
     }
 
-    /// The voxel of a column, and its place inside as 10-bit fractions.
-    pub(super) fn voxel(&self, column: usize) -> ([i64; 3], [u64; 3]) {
-        let at = [0, 1, 2].map(|axis| self.at[axis] + self.step[axis] * column as i64);
-        (at.map(|x| x >> POINT), at.map(|x| (x >> (POINT - 10)) as u64 & 1023))
+    /// The row from a column on, counted from the voxel `low`, which no column of the stretch lies below.
+    pub(super) fn local(&self, column: usize, low: [i64; 3]) -> LocalRow {
+        let at = [0, 1, 2].map(|axis| {
+            let at = self.at[axis] + self.step[axis] * column as i64;
+            (at - (low[axis] << POINT)).cast_unsigned()
+        });
+        LocalRow { at, step: self.step.map(i64::cast_unsigned) }
+    }
+
+    /// The voxel of a column.
+    #[cfg(test)]
+    fn voxel(&self, column: usize) -> [i64; 3] {
+        [0, 1, 2].map(|axis| (self.at[axis] + self.step[axis] * column as i64) >> POINT)
+    }
+}
+
+/// A stretch of a row inside a box of voxels, counted from the box's first: never below zero.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LocalRow {
+    at: [u64; 3],
+    step: [u64; 3],
+}
+
+impl LocalRow {
+    /// The index of every pixel's voxel in the box's cells; `strides` are those of y and z.
+    pub(super) fn indices(&self, strides: [usize; 2], out: &mut [u32]) {
+        let [ny, nz] = strides.map(|s| u64::from(s as u32));
+        let [mut x, mut y, mut z] = self.at;
+        for index in out {
+            *index = ((z >> POINT) * nz + (y >> POINT) * ny + (x >> POINT)) as u32;
+            x = x.wrapping_add(self.step[0]);
+            y = y.wrapping_add(self.step[1]);
+            z = z.wrapping_add(self.step[2]);
+        }
+    }
+
+    /// Where in its voxel every pixel lies, in 1024ths.
+    pub(super) fn fractions<const N: usize>(&self, out: &mut [[u32; N]; 3], pixels: usize) {
+        for (axis, out) in out.iter_mut().enumerate() {
+            let mut at = self.at[axis];
+            for fraction in &mut out[..pixels.min(N)] {
+                *fraction = (at as u32) >> (POINT - 10);
+                at = at.wrapping_add(self.step[axis]);
+            }
+        }
     }
 }
 
@@ -107,9 +162,9 @@ mod tests {
             let run = 2..14;
             let slow: Vec<usize> = run
                 .clone()
-                .filter(|u| row.voxel(*u).0.iter().zip(&voxels).all(|(v, range)| range.contains(v)))
+                .filter(|u| row.voxel(*u).iter().zip(&voxels).all(|(v, range)| range.contains(v)))
                 .collect();
-            let fast: Vec<usize> = row.within(run, voxels).collect();
+            let fast: Vec<usize> = row.within(run, &voxels).collect();
             assert_eq!(fast, slow);
         }
     }

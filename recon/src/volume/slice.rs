@@ -9,13 +9,21 @@ use probepath_us_capture::{PixelMap, PlacedBScan};
 pub struct Slice<'a> {
     pub(super) pixels: &'a [u8],
     pub(super) width: usize,
+    pub(super) weights: Option<&'a [u8]>,
     pub(super) map: PixelMap<World>,
 }
 
 impl<'a> Slice<'a> {
     /// Grey levels row after row, `width` a row.
     pub const fn new(pixels: &'a [u8], width: usize, world_from_pixel: PixelMap<World>) -> Self {
-        Self { pixels, width, map: world_from_pixel }
+        Self { pixels, width, weights: None, map: world_from_pixel }
+    }
+
+    /// What each pixel of this image counts, beside [`VolumeSettings::importance`](super::VolumeSettings::importance):
+    /// less in a shadow, 0 where it is not to be used.
+    #[must_use]
+    pub const fn weighted(self, weights: &'a [u8]) -> Self {
+        Self { weights: Some(weights), ..self }
     }
 
     /// Rows.

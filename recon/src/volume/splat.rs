@@ -1,174 +1,150 @@
-//! Pixels into voxels. Every thread owns a slab of the volume and walks all images, so that nothing is shared, the
-//! order of the pixels is the same for any number of threads, and sums are exact.
+//! Pixels into voxels. The volume is cut into slabs along z; a thread owns the slab it works on and puts all images into
+//! it, one after the other: nothing is shared, the order of the pixels is the same for any number of threads, and sums
+//! are exact. Only the slabs at work hold cells; the volume itself holds a grey level and a mark for each voxel.
 
 use std::ops::Range;
 
 use rayon::prelude::*;
 
 use super::clip::Clip;
-use super::compound::{Brightest, Cell, CountedMean, Last, WeightedMean};
-use super::rows::{FixedMap, FixedRow};
+use super::compound::{Brightest, Cell, CountedMean, Last, Tally, WeightedMean};
+use super::rows::FixedMap;
+use super::slab::{Ready, Slab, rim};
 use super::{Compounding, Grid, Mark, Slice, VolumeError, VolumeSettings, Weights};
 
-type Voxels = (Vec<u8>, Vec<Mark>);
+/// Cells of a slab take about this many bytes, so that they stay near the processor.
+const SLAB_BYTES: u64 = 8 << 20;
+/// Slabs are no thinner than this many layers, where an image that crosses many would be cut into too many pieces.
+const LEAST_LAYERS: u64 = 8;
 
-/// Grey levels and marks of all slices.
-pub(super) fn splat(
-    slices: &[Slice<'_>],
-    grid: &Grid,
-    settings: &VolumeSettings,
-) -> Result<Voxels, VolumeError> {
-    match (settings.compounding, settings.weights) {
-        (Compounding::Mean, Weights::Nearest) => run::<CountedMean>(slices, grid, settings),
-        (Compounding::Mean, Weights::Linear) => run::<WeightedMean>(slices, grid, settings),
-        (Compounding::Maximum, _) => run::<Brightest>(slices, grid, settings),
-        (Compounding::Latest, _) => run::<Last>(slices, grid, settings),
-    }
+/// Slices ready to be walked, and one clip for every size of image.
+pub(super) struct Walk<'a> {
+    slices: Vec<Ready<'a>>,
+    clips: Vec<Clip>,
+    /// Layers that each slice touches.
+    layers: Vec<Range<i64>>,
 }
 
-/// A slice ready to be walked.
-struct Ready<'a> {
-    pixels: &'a [u8],
-    width: usize,
-    map: FixedMap,
-    clip: usize,
-}
-
-fn run<C: Cell>(slices: &[Slice<'_>], grid: &Grid, settings: &VolumeSettings) -> Result<Voxels, VolumeError> {
-    let (ready, clips) = prepare(slices, grid, settings)?;
-    let [nx, ny, nz] = grid.size;
-    let mut cells = vec![C::default(); nx * ny * nz];
-    let layers = nz.div_ceil(4 * rayon::current_num_threads()).max(1);
-    cells.par_chunks_mut(nx * ny * layers).enumerate().for_each(|(number, cells)| {
-        let first = number * layers;
-        let mut slab =
-            Slab { cells, size: [nx as i64, ny as i64], z: first as i64..(first + layers).min(nz) as i64 };
-        for slice in &ready {
-            let Some(clip) = clips.get(slice.clip) else { continue };
-            match settings.weights {
-                Weights::Nearest => slab.nearest(slice, clip),
-                Weights::Linear => slab.linear(slice, clip),
-            }
+impl<'a> Walk<'a> {
+    pub(super) fn prepare(
+        slices: &[Slice<'a>],
+        grid: &Grid,
+        settings: &VolumeSettings,
+    ) -> Result<Self, VolumeError> {
+        let mut walk =
+            Self { slices: Vec::with_capacity(slices.len()), clips: Vec::new(), layers: Vec::new() };
+        for (image, slice) in slices.iter().enumerate() {
+            walk.push(slice, grid, settings).ok_or(VolumeError::OffGrid { image })?;
         }
-    });
-    Ok(finish(&cells))
-}
+        Ok(walk)
+    }
 
-/// Slices in fixed point, and one clip for every size of image.
-fn prepare<'a>(
-    slices: &[Slice<'a>],
-    grid: &Grid,
-    settings: &VolumeSettings,
-) -> Result<(Vec<Ready<'a>>, Vec<Clip>), VolumeError> {
-    let mut clips: Vec<Clip> = Vec::new();
-    let half = settings.weights == Weights::Nearest;
-    let mut ready = Vec::with_capacity(slices.len());
-    for (image, slice) in slices.iter().enumerate() {
-        let map = FixedMap::of(slice, grid, half).ok_or(VolumeError::OffGrid { image })?;
+    /// `None` when the slice lies too far away.
+    fn push(&mut self, slice: &Slice<'a>, grid: &Grid, settings: &VolumeSettings) -> Option<()> {
+        let map = FixedMap::of(slice, grid, settings.weights == Weights::Nearest)?;
         let size = (slice.width, slice.height());
-        let known = clips.iter().position(|c| (c.width, c.height) == size);
+        let known = self.clips.iter().position(|c| (c.width, c.height) == size);
         let clip = known.unwrap_or_else(|| {
-            clips.push(Clip::of(&settings.region, size.0, size.1));
-            clips.len() - 1
+            self.clips
+                .push(Clip::of(&settings.region, size.0, size.1).weighted(settings.importance.as_ref()));
+            self.clips.len() - 1
         });
-        ready.push(Ready { pixels: slice.pixels, width: slice.width, map, clip });
+        self.layers.push(map.span(2, slice.width, slice.height()));
+        let (pixels, width, weights) = (slice.pixels, slice.width, slice.weights);
+        self.slices.push(Ready { pixels, weights, width, map, clip });
+        Some(())
     }
-    Ok((ready, clips))
+
+    /// The slices that touch these layers, in their order.
+    fn touching(&self, layers: &Range<i64>) -> impl Iterator<Item = (&Ready<'a>, &Clip)> {
+        let touch = |own: &Range<i64>| own.start < layers.end && layers.start < own.end;
+        let near = self.slices.iter().zip(&self.layers).filter(move |(_, own)| touch(own));
+        near.filter_map(|(slice, _)| Some((slice, self.clips.get(slice.clip)?)))
+    }
 }
 
-fn finish<C: Cell>(cells: &[C]) -> Voxels {
-    let voxel = |cell: &C| cell.grey().map_or((0, Mark::Unseen), |grey| (grey, Mark::Seen));
-    cells.par_iter().map(voxel).unzip()
+/// Grey levels and marks of the layers from `first` on, as many as fit into `grey`.
+pub(super) fn splat(
+    walk: &Walk<'_>,
+    grid: &Grid,
+    settings: &VolumeSettings,
+    first: usize,
+    (grey, marks): (&mut [u8], &mut [Mark]),
+) {
+    let weighted = settings.importance.is_some() || walk.slices.iter().any(|slice| slice.weights.is_some());
+    let work = match (settings.compounding, settings.weights) {
+        (Compounding::Mean, Weights::Nearest) if !weighted => run::<CountedMean>,
+        (Compounding::Mean, _) => run::<WeightedMean>,
+        (Compounding::Maximum, _) => run::<Brightest>,
+        (Compounding::Latest, _) => run::<Last>,
+        (Compounding::Median, _) => run::<Tally>,
+    };
+    work(walk, grid, settings, first, (grey, marks));
 }
 
-/// The layers of one thread.
-struct Slab<'c, C> {
-    cells: &'c mut [C],
-    size: [i64; 2],
-    z: Range<i64>,
-}
-
-impl<C: Cell> Slab<'_, C> {
-    /// Neighbouring pixels mostly fall into one voxel: they are added up first and merged once.
-    fn nearest(&mut self, slice: &Ready<'_>, clip: &Clip) {
-        let voxels = [0..self.size[0], 0..self.size[1], self.z.clone()];
-        for (row, pixels, columns) in rows(slice, clip, voxels) {
-            let (mut here, mut run) = (usize::MAX, C::default());
-            for (column, grey) in columns.clone().zip(pixels) {
-                let index = self.index(row.voxel(column).0);
-                if index != here {
-                    self.merge(here, &run);
-                    (here, run) = (index, C::default());
-                }
-                run.add(1, *grey);
+fn run<C: Cell>(
+    walk: &Walk<'_>,
+    grid: &Grid,
+    settings: &VolumeSettings,
+    first: usize,
+    (grey, marks): (&mut [u8], &mut [Mark]),
+) {
+    let [nx, ny, _] = grid.size;
+    let layer = nx * ny;
+    let thick = slab_layers(grid, settings).min(grey.len() / layer.max(1)).max(1);
+    let slabs = grey.par_chunks_mut(layer * thick).zip(marks.par_chunks_mut(layer * thick)).enumerate();
+    let room = || Slab::<C>::over(&[0..0, 0..0, 0..0], settings.weights);
+    slabs.for_each_init(room, |slab, (number, (grey, marks))| {
+        let low = (first + number * thick) as i64;
+        let layers = low..low + (grey.len() / layer.max(1)) as i64;
+        slab.clear(&[0..nx as i64, 0..ny as i64, layers.clone()]);
+        for pass in 0..C::PASSES {
+            if pass > 0 {
+                slab.next_pass();
             }
-            self.merge(here, &run);
+            walk.touching(&layers).for_each(|(slice, clip)| slab.add(slice, clip));
         }
-    }
+        finish(slab, nx, (grey, marks));
+    });
+}
 
-    /// The same with the eight voxels around; a pixel may lie one voxel outside and still touch the slab.
-    fn linear(&mut self, slice: &Ready<'_>, clip: &Clip) {
-        let voxels = [-1..self.size[0], -1..self.size[1], self.z.start - 1..self.z.end];
-        for (row, pixels, columns) in rows(slice, clip, voxels) {
-            let (mut here, mut runs) = ([i64::MIN; 3], [C::default(); 8]);
-            for (column, grey) in columns.clone().zip(pixels) {
-                let (voxel, fraction) = row.voxel(column);
-                if voxel != here {
-                    self.merge_around(here, &runs);
-                    (here, runs) = (voxel, [C::default(); 8]);
-                }
-                for (run, weight) in runs.iter_mut().zip(weights(fraction)) {
-                    if weight > 0 {
-                        run.add(weight, *grey);
-                    }
-                }
-            }
-            self.merge_around(here, &runs);
-        }
-    }
-
-    fn merge(&mut self, index: usize, run: &C) {
-        if let Some(cell) = self.cells.get_mut(index) {
-            cell.merge(run);
-        }
-    }
-
-    fn merge_around(&mut self, [x, y, z]: [i64; 3], runs: &[C; 8]) {
-        if x == i64::MIN {
-            return;
-        }
-        for (corner, run) in (0_i64..).zip(runs) {
-            let at = [x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2)];
-            let inside = (0..self.size[0]).contains(&at[0]) && (0..self.size[1]).contains(&at[1]);
-            if inside && self.z.contains(&at[2]) {
-                self.merge(self.index(at), run);
+fn finish<C: Cell>(slab: &Slab<C>, nx: usize, (grey, marks): (&mut [u8], &mut [Mark])) {
+    let rows = grey.chunks_exact_mut(nx).zip(marks.chunks_exact_mut(nx));
+    for ((grey, marks), cells) in rows.zip(slab.rows()) {
+        for ((grey, mark), cell) in grey.iter_mut().zip(marks).zip(cells) {
+            if let Some(value) = cell.grey() {
+                (*grey, *mark) = (value, Mark::Seen);
             }
         }
     }
-
-    /// A voxel inside the slab.
-    const fn index(&self, [x, y, z]: [i64; 3]) -> usize {
-        (((z - self.z.start) * self.size[1] + y) * self.size[0] + x) as usize
-    }
 }
 
-/// The rows of a slice with their pixels and columns that fall into the box.
-fn rows<'s>(
-    slice: &'s Ready<'_>,
-    clip: &'s Clip,
-    voxels: [Range<i64>; 3],
-) -> impl Iterator<Item = (FixedRow, &'s [u8], Range<usize>)> {
-    clip.runs().filter_map(move |(row, run)| {
-        let fixed = slice.map.row(row);
-        let columns = fixed.within(run, voxels.clone());
-        let start = row * slice.width;
-        let pixels = slice.pixels.get(start + columns.start..start + columns.end)?;
-        (!pixels.is_empty()).then_some((fixed, pixels, columns))
-    })
+/// Bytes of a cell.
+const fn cell_bytes(settings: &VolumeSettings) -> u64 {
+    let bytes = match (settings.compounding, settings.weights) {
+        (Compounding::Mean, _) => size_of::<WeightedMean>(),
+        (Compounding::Maximum | Compounding::Latest, _) => size_of::<Last>(),
+        (Compounding::Median, _) => size_of::<Tally>(),
+    };
+    bytes as u64
 }
 
-/// Trilinear weights of the eight voxels around, x fastest; they sum to 2^30.
-fn weights([x, y, z]: [u64; 3]) -> [u64; 8] {
-    let (x, y, z) = ([1024 - x, x], [1024 - y, y], [1024 - z, z]);
-    std::array::from_fn(|corner| x[corner & 1] * y[corner >> 1 & 1] * z[corner >> 2])
+/// Cells of one layer, rim and all; saturating, because it is asked before sizes are known to be sound.
+fn layer_bytes(grid: &Grid, settings: &VolumeSettings) -> u64 {
+    let around = 2 * rim(settings.weights) as u64;
+    let [nx, ny, _] = grid.size.map(|n| (n as u64).saturating_add(around));
+    nx.saturating_mul(ny).saturating_mul(cell_bytes(settings))
+}
+
+/// Layers of a slab.
+fn slab_layers(grid: &Grid, settings: &VolumeSettings) -> usize {
+    let layers = (SLAB_BYTES / layer_bytes(grid, settings).max(1)).max(LEAST_LAYERS);
+    layers.min(grid.size[2].max(1) as u64) as usize
+}
+
+/// What the cells of the slabs at work take (bytes).
+pub(super) fn working_bytes(grid: &Grid, settings: &VolumeSettings) -> u64 {
+    let layers = slab_layers(grid, settings) as u64 + 2 * rim(settings.weights) as u64;
+    let slabs = rayon::current_num_threads() as u64;
+    layer_bytes(grid, settings).saturating_mul(layers).saturating_mul(slabs)
 }
