@@ -26,28 +26,34 @@
 mod clip;
 mod compound;
 mod correlation;
+mod cut;
 mod error;
 mod files;
 mod grid;
 mod holes;
 mod importance;
+mod live;
 mod memory;
 mod rows;
 mod settings;
 mod slab;
 mod slice;
+mod speckle;
 mod splat;
 mod strip;
 mod swept;
 mod tiles;
 
 pub use correlation::{Correlation, NotComparable};
+pub use cut::{Cut, Interpolation};
 pub use error::VolumeError;
-pub use files::Layer;
+pub use files::{Layer, Written};
 pub use grid::Grid;
 pub use importance::Importance;
+pub use live::LiveVolume;
 pub use settings::{Compounding, Holes, Region, Sticks, Swept, VolumeSettings, Weights};
 pub use slice::Slice;
+pub use speckle::{SpeckleSettings, SpeckleVolume};
 pub use tiles::Tiles;
 
 /// What is known of a voxel.

@@ -9,8 +9,8 @@ use super::{Importance, Region};
 /// Runs of columns for the rows of an image of one size.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Clip {
-    pub(super) width: usize,
-    pub(super) height: usize,
+    width: usize,
+    height: usize,
     runs: Vec<(usize, Range<usize>)>,
     /// For every row the first of its runs, and the end of the last row's.
     first: Vec<usize>,
@@ -31,6 +31,19 @@ impl Clip {
         let runs: Vec<_> = rows.flat_map(|row| runs_of(region.fan.as_ref(), columns.clone(), row)).collect();
         let first = (0..=height).map(|row| runs.partition_point(|(at, _)| *at < row)).collect();
         Self { width, height, runs, first, weights: None }
+    }
+
+    /// The number of the clip for images of this size, made when there is none yet.
+    pub(super) fn number(
+        clips: &mut Vec<Self>,
+        (width, height): (usize, usize),
+        make: impl FnOnce(usize, usize) -> Self,
+    ) -> usize {
+        let known = clips.iter().position(|clip| (clip.width, clip.height) == (width, height));
+        known.unwrap_or_else(|| {
+            clips.push(make(width, height));
+            clips.len() - 1
+        })
     }
 
     /// With the importance of every pixel.

@@ -55,7 +55,8 @@ pub(super) trait Cell: Copy + Default + Send + Sync {
     }
 }
 
-fn merge_at<C: Cell>(cells: &mut [C], at: [usize; 8], runs: &[C; 8]) {
+/// Adds what runs became to the eight cells around them.
+pub(super) fn merge_at<C: Cell>(cells: &mut [C], at: [usize; 8], runs: &[C; 8]) {
     for (index, run) in at.into_iter().zip(runs) {
         if let Some(cell) = cells.get_mut(index) {
             cell.merge(run);
@@ -64,7 +65,7 @@ fn merge_at<C: Cell>(cells: &mut [C], at: [usize; 8], runs: &[C; 8]) {
 }
 
 /// Trilinear weights of the eight voxels around, x fastest; they sum to 2^30.
-fn trilinear([x, y, z]: [u32; 3]) -> [u64; 8] {
+pub(super) fn trilinear([x, y, z]: [u32; 3]) -> [u64; 8] {
     let (x, y, z) = ([1024 - x, x], [1024 - y, y], [1024 - z, z]);
     std::array::from_fn(|corner| u64::from(x[corner & 1]) * u64::from(y[corner >> 1 & 1] * z[corner >> 2]))
 }
@@ -128,9 +129,14 @@ impl Cell for WeightedMean {
         (self.sum + self.weights / 2).checked_div(self.weights).map(|g| g as u8)
     }
 
-    fn run(&mut self, _pixels: &Pixels<'_>, strip: &Strip, run: Range<usize>) {
-        self.weights += u64::from(strip.weights(run.clone()));
-        self.sum += u64::from(strip.greys(run));
+    fn run(&mut self, pixels: &Pixels<'_>, strip: &Strip, run: Range<usize>) {
+        let sum = u64::from(strip.greys(run.clone()));
+        let (weight, sum) = match pixels.weight {
+            Some(_) => (u64::from(strip.weights(run)), sum),
+            None => (u64::from(pixels.plain) * run.len() as u64, u64::from(pixels.plain) * sum),
+        };
+        self.weights += weight;
+        self.sum += sum;
     }
 }
 

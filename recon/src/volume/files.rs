@@ -1,5 +1,7 @@
 //! Volumes as MHA and NRRD: LPS, millimetres, both said in the file.
 
+mod parts;
+
 use std::ffi::OsStr;
 use std::io::Write;
 use std::path::Path;
@@ -9,6 +11,8 @@ use flate2::write::{GzEncoder, ZlibEncoder};
 use nalgebra::Vector3;
 use probepath_frames::Point;
 use probepath_us_capture::sequence::{Claim, Entry, Format, Header, SequenceError, read_parts, save, unpack};
+
+pub use parts::Written;
 
 use super::{Grid, Mark, Volume};
 
@@ -27,12 +31,7 @@ impl Volume {
     /// # Errors
     /// When the ending is another, or the disk refuses.
     pub fn write(&self, path: &Path, layer: Layer) -> Result<(), SequenceError> {
-        let format = match path.extension().and_then(OsStr::to_str) {
-            Some("mha") => Format::MetaImage,
-            Some("nrrd") => Format::Nrrd,
-            _ => return Err(SequenceError::UnknownEnding { path: path.into() }),
-        };
-        save(path, &self.to_bytes(format, layer))
+        save(path, &self.to_bytes(format_of(path)?, layer))
     }
 
     /// The bytes of such a file.
@@ -47,7 +46,7 @@ impl Volume {
         };
         let packed = packed(format, voxels);
         let mut bytes = match format {
-            Format::MetaImage => metaimage(&self.grid, packed.len()),
+            Format::MetaImage => metaimage(&self.grid, &packed.len().to_string()),
             Format::Nrrd => nrrd(&self.grid),
         }
         .into_bytes();
@@ -79,6 +78,14 @@ impl Volume {
     }
 }
 
+fn format_of(path: &Path) -> Result<Format, SequenceError> {
+    match path.extension().and_then(OsStr::to_str) {
+        Some("mha") => Ok(Format::MetaImage),
+        Some("nrrd") => Ok(Format::Nrrd),
+        _ => Err(SequenceError::UnknownEnding { path: path.into() }),
+    }
+}
+
 /// A `Vec` takes every byte, so nothing here can fail.
 fn packed(format: Format, voxels: &[u8]) -> Vec<u8> {
     match format {
@@ -100,7 +107,7 @@ fn mm(metres: f64) -> f64 {
     (metres * 1e12).round() / 1e9
 }
 
-fn metaimage(grid: &Grid, packed: usize) -> String {
+fn metaimage(grid: &Grid, packed: &str) -> String {
     let ([nx, ny, nz], [sx, sy, sz], o) = (grid.size, grid.spacing_m.map(mm), grid.origin.vector().map(mm));
     // RAI is MetaImage's name for axes that run from right, anterior and inferior: toward left, posterior, superior.
     format!(

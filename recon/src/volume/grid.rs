@@ -85,7 +85,7 @@ impl Grid {
 }
 
 /// The corners of the region's rectangle, its far edges counted as one more column and row.
-fn corners(
+pub(super) fn corners(
     image: usize,
     slice: &Slice<'_>,
     settings: &VolumeSettings,

@@ -42,7 +42,7 @@ impl VolumeSettings {
             slice.check(image)?;
         }
         let weighted = self.importance.is_some() || slices.iter().any(|slice| slice.weights.is_some());
-        densest(slices, grid, if weighted { MOST_WEIGHTED_HITS } else { MOST_HITS })
+        exact(slices.iter().map(|slice| hits(slice, grid)).sum(), weighted).map(|_| ())
     }
 }
 
@@ -51,21 +51,23 @@ const MOST_HITS: f64 = 67_108_864.0;
 /// With weights of 8 bits on top.
 const MOST_WEIGHTED_HITS: f64 = MOST_HITS / 256.0;
 
-/// How many pixels a voxel could take at most: those of a plane that pass within a voxel's diagonal of its centre.
-fn densest(slices: &[Slice<'_>], grid: &Grid, most: f64) -> Result<(), VolumeError> {
+/// Refuses more pixels in a voxel than can be summed exactly.
+pub(super) fn exact(hits: f64, weighted: bool) -> Result<f64, VolumeError> {
+    let most = if weighted { MOST_WEIGHTED_HITS } else { MOST_HITS };
+    if hits > most { Err(VolumeError::TooDense { hits }) } else { Ok(hits) }
+}
+
+/// How many pixels of an image a voxel could take at most: those that pass within a voxel's diagonal of its centre.
+pub(super) fn hits(slice: &Slice<'_>, grid: &Grid) -> f64 {
     let reach = 2.0 * grid.spacing_m.iter().map(|s| s * s).sum::<f64>().sqrt();
-    let hits = |slice: &Slice<'_>| {
-        let (column, row) = (slice.map.column_step(), slice.map.row_step());
-        let area = column.cross(&row).norm().max(f64::MIN_POSITIVE);
-        let around = (reach * row.norm() / area + 2.0) * (reach * column.norm() / area + 2.0);
-        around.min(slice.pixels.len() as f64)
-    };
-    let hits: f64 = slices.iter().map(hits).sum();
-    if hits > most { Err(VolumeError::TooDense { hits }) } else { Ok(()) }
+    let (column, row) = (slice.map.column_step(), slice.map.row_step());
+    let area = column.cross(&row).norm().max(f64::MIN_POSITIVE);
+    let around = (reach * row.norm() / area + 2.0) * (reach * column.norm() / area + 2.0);
+    around.min(slice.pixels.len() as f64)
 }
 
 impl Slice<'_> {
-    fn check(&self, image: usize) -> Result<(), VolumeError> {
+    pub(super) fn check(&self, image: usize) -> Result<(), VolumeError> {
         let finite = [self.map.at(0.0, 0.0).vector(), self.map.column_step(), self.map.row_step()];
         let finite = finite.iter().flat_map(|v| v.iter()).all(|x| x.is_finite());
         let (bytes, width) = (self.pixels.len(), self.width);

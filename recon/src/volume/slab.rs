@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use super::Weights;
 use super::clip::Clip;
 use super::compound::Cell;
-use super::rows::{FixedMap, FixedRow};
+use super::rows::{FixedMap, FixedRow, LocalRow};
 use super::strip::{MOST, Pixels, Strip};
+use super::{Mark, Weights};
 
 /// A slice ready to be walked.
 #[derive(Clone, Debug)]
@@ -28,14 +28,16 @@ pub(super) struct Slab<C> {
     /// Cells along x, y, z.
     size: [usize; 3],
     rim: usize,
+    /// What a pixel without a weight counts.
+    plain: u8,
     strip: Strip,
 }
 
 impl<C: Cell> Slab<C> {
     /// Empty cells for the voxels of a box.
-    pub(super) fn over(voxels: &[Range<i64>; 3], weights: Weights) -> Self {
-        let mut slab =
-            Self { cells: Vec::new(), low: [0; 3], size: [0; 3], rim: rim(weights), strip: Strip::new() };
+    pub(super) fn over(voxels: &[Range<i64>; 3], weights: Weights, plain: u8) -> Self {
+        let (rim, strip) = (rim(weights), Strip::new());
+        let mut slab = Self { cells: Vec::new(), low: [0; 3], size: [0; 3], rim, plain, strip };
         slab.clear(voxels);
         slab
     }
@@ -48,6 +50,77 @@ impl<C: Cell> Slab<C> {
             [0, 1, 2].map(|axis: usize| (voxels[axis].end - voxels[axis].start).max(0) as usize + 2 * rim);
         self.cells.clear();
         self.cells.resize(self.size.iter().product(), C::default());
+    }
+
+    /// What each grey level stands for, for cells that ask.
+    pub(super) const fn set_levels(&mut self, levels: &[u32; 256]) {
+        self.strip.set_levels(levels);
+    }
+
+    /// The voxels of the box.
+    pub(super) fn voxels(&self) -> [Range<i64>; 3] {
+        let rim = self.rim as i64;
+        [0, 1, 2].map(|axis: usize| self.low[axis] + rim..self.low[axis] + self.size[axis] as i64 - rim)
+    }
+
+    /// What the cells of a box take (bytes).
+    pub(super) fn bytes(voxels: &[Range<i64>; 3], weights: Weights) -> u64 {
+        let cells =
+            voxels.iter().map(|range| (range.end - range.start).max(0) as u64 + 2 * rim(weights) as u64);
+        cells.fold(size_of::<C>() as u64, u64::saturating_mul)
+    }
+
+    /// A larger box with the same cells. Its rim is new: what went to the old one belongs to no voxel that an image
+    /// reached so far.
+    pub(super) fn grow(&mut self, voxels: &[Range<i64>; 3]) {
+        if *voxels == self.voxels() {
+            return;
+        }
+        let weights = if self.rim == 0 { Weights::Nearest } else { Weights::Linear };
+        let mut grown = Self::over(voxels, weights, self.plain);
+        let [x, y, z] = self.voxels();
+        let places = z.flat_map(|z| y.clone().map(move |y| [x.start, y, z]));
+        for (place, row) in places.zip(self.rows()) {
+            let first = grown.index(place);
+            if let Some(cells) = first.and_then(|first| grown.cells.get_mut(first..first + row.len())) {
+                cells.copy_from_slice(row);
+            }
+        }
+        *self = grown;
+    }
+
+    /// Where a voxel's cell is; `None` outside.
+    fn index(&self, voxel: [i64; 3]) -> Option<usize> {
+        let [x, y, z] = [0, 1, 2].map(|axis: usize| {
+            usize::try_from(voxel[axis] - self.low[axis]).ok().filter(|at| *at < self.size[axis])
+        });
+        Some((z? * self.size[1] + y?) * self.size[0] + x?)
+    }
+
+    /// Grey levels and marks of a layer's voxels from `first` on, `[nx, ny]` of them.
+    pub(super) fn layer(
+        &self,
+        first: [i64; 3],
+        [nx, ny]: [usize; 2],
+        (grey, marks): (&mut [u8], &mut [Mark]),
+    ) {
+        let [own, rows, _] = self.voxels();
+        let columns = own.start.max(first[0])..own.end.min(first[0] + nx as i64);
+        if columns.is_empty() {
+            return;
+        }
+        for y in rows.start.max(first[1])..rows.end.min(first[1] + ny as i64) {
+            let count = (columns.end - columns.start) as usize;
+            let start = (y - first[1]) as usize * nx + (columns.start - first[0]) as usize;
+            let Some(cell) = self.index([columns.start, y, first[2]]) else { continue };
+            let cells = self.cells.get(cell..cell + count).unwrap_or_default();
+            let out = grey.iter_mut().zip(marks.iter_mut()).skip(start);
+            for (cell, (grey, mark)) in cells.iter().zip(out) {
+                if let Some(value) = cell.grey() {
+                    (*grey, *mark) = (value, Mark::Seen);
+                }
+            }
+        }
     }
 
     /// Puts an image's pixels in.
@@ -77,13 +150,13 @@ impl<C: Cell> Slab<C> {
             let own = slice.weights.and_then(|weights| weights.get(first..last));
             let weight = mix(own, clip.weights(first..last), &mut mixed);
             let local = fixed.local(start, self.low);
-            let pixels = Pixels { grey, weight };
+            let pixels = Pixels { grey, weight, plain: self.plain };
             if self.rim == 0 { self.nearest(&local, &pixels) } else { self.linear(&local, &pixels) }
         }
     }
 
     /// Neighbouring pixels mostly fall into one voxel: they are added up first.
-    fn nearest(&mut self, row: &super::rows::LocalRow, pixels: &Pixels<'_>) {
+    fn nearest(&mut self, row: &LocalRow, pixels: &Pixels<'_>) {
         let runs = self.strip.locate(row, self.strides(), pixels.grey.len());
         if C::SUMS {
             self.strip.sum(pixels);
@@ -96,7 +169,7 @@ impl<C: Cell> Slab<C> {
     }
 
     /// The same with the eight voxels around.
-    fn linear(&mut self, row: &super::rows::LocalRow, pixels: &Pixels<'_>) {
+    fn linear(&mut self, row: &LocalRow, pixels: &Pixels<'_>) {
         let [y, z] = self.strides();
         let runs = self.strip.locate_within(row, [y, z], pixels.grey.len());
         for (voxel, run) in self.strip.runs(runs) {

@@ -10,6 +10,7 @@ use super::clip::Clip;
 use super::compound::{Brightest, Cell, CountedMean, Last, Tally, WeightedMean};
 use super::rows::FixedMap;
 use super::slab::{Ready, Slab, rim};
+use super::strip::{ONE, WHOLE};
 use super::{Compounding, Grid, Mark, Slice, VolumeError, VolumeSettings, Weights};
 
 /// Cells of a slab take about this many bytes, so that they stay near the processor.
@@ -43,11 +44,8 @@ impl<'a> Walk<'a> {
     fn push(&mut self, slice: &Slice<'a>, grid: &Grid, settings: &VolumeSettings) -> Option<()> {
         let map = FixedMap::of(slice, grid, settings.weights == Weights::Nearest)?;
         let size = (slice.width, slice.height());
-        let known = self.clips.iter().position(|c| (c.width, c.height) == size);
-        let clip = known.unwrap_or_else(|| {
-            self.clips
-                .push(Clip::of(&settings.region, size.0, size.1).weighted(settings.importance.as_ref()));
-            self.clips.len() - 1
+        let clip = Clip::number(&mut self.clips, size, |width, height| {
+            Clip::of(&settings.region, width, height).weighted(settings.importance.as_ref())
         });
         self.layers.push(map.span(2, slice.width, slice.height()));
         let (pixels, width, weights) = (slice.pixels, slice.width, slice.weights);
@@ -55,8 +53,13 @@ impl<'a> Walk<'a> {
         Some(())
     }
 
+    /// Whether any pixel has a weight.
+    fn weighted(&self, settings: &VolumeSettings) -> bool {
+        settings.importance.is_some() || self.slices.iter().any(|slice| slice.weights.is_some())
+    }
+
     /// The slices that touch these layers, in their order.
-    fn touching(&self, layers: &Range<i64>) -> impl Iterator<Item = (&Ready<'a>, &Clip)> {
+    pub(super) fn touching(&self, layers: &Range<i64>) -> impl Iterator<Item = (&Ready<'a>, &Clip)> {
         let touch = |own: &Range<i64>| own.start < layers.end && layers.start < own.end;
         let near = self.slices.iter().zip(&self.layers).filter(move |(_, own)| touch(own));
         near.filter_map(|(slice, _)| Some((slice, self.clips.get(slice.clip)?)))
@@ -71,7 +74,7 @@ pub(super) fn splat(
     first: usize,
     (grey, marks): (&mut [u8], &mut [Mark]),
 ) {
-    let weighted = settings.importance.is_some() || walk.slices.iter().any(|slice| slice.weights.is_some());
+    let weighted = walk.weighted(settings);
     let work = match (settings.compounding, settings.weights) {
         (Compounding::Mean, Weights::Nearest) if !weighted => run::<CountedMean>,
         (Compounding::Mean, _) => run::<WeightedMean>,
@@ -93,7 +96,8 @@ fn run<C: Cell>(
     let layer = nx * ny;
     let thick = slab_layers(grid, settings).min(grey.len() / layer.max(1)).max(1);
     let slabs = grey.par_chunks_mut(layer * thick).zip(marks.par_chunks_mut(layer * thick)).enumerate();
-    let room = || Slab::<C>::over(&[0..0, 0..0, 0..0], settings.weights);
+    let plain = if walk.weighted(settings) { WHOLE } else { ONE };
+    let room = || Slab::<C>::over(&[0..0, 0..0, 0..0], settings.weights, plain);
     slabs.for_each_init(room, |slab, (number, (grey, marks))| {
         let low = (first + number * thick) as i64;
         let layers = low..low + (grey.len() / layer.max(1)) as i64;
@@ -137,7 +141,7 @@ fn layer_bytes(grid: &Grid, settings: &VolumeSettings) -> u64 {
 }
 
 /// Layers of a slab.
-fn slab_layers(grid: &Grid, settings: &VolumeSettings) -> usize {
+pub(super) fn slab_layers(grid: &Grid, settings: &VolumeSettings) -> usize {
     let layers = (SLAB_BYTES / layer_bytes(grid, settings).max(1)).max(LEAST_LAYERS);
     layers.min(grid.size[2].max(1) as u64) as usize
 }

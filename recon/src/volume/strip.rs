@@ -7,12 +7,18 @@ use super::rows::LocalRow;
 /// Columns that are worked on at once.
 pub(super) const MOST: usize = 256;
 
-/// Grey levels of a stretch and what each counts; all 1 without weights.
+/// Grey levels of a stretch and what each counts: `plain` without weights.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pixels<'a> {
     pub(super) grey: &'a [u8],
     pub(super) weight: Option<&'a [u8]>,
+    pub(super) plain: u8,
 }
+
+/// What a pixel counts where no weights are about, so that sums stay small.
+pub(super) const ONE: u8 = 1;
+/// What a pixel without a weight counts beside those that have one.
+pub(super) const WHOLE: u8 = 255;
 
 impl Pixels<'_> {
     pub(super) fn grey_at(&self, at: usize) -> u8 {
@@ -20,7 +26,7 @@ impl Pixels<'_> {
     }
 
     pub(super) fn weight_at(&self, at: usize) -> u8 {
-        self.weight.map_or(1, |weight| weight.get(at).copied().unwrap_or(0))
+        self.weight.map_or(self.plain, |weight| weight.get(at).copied().unwrap_or(0))
     }
 }
 
@@ -31,6 +37,7 @@ pub(super) struct Strip {
     ends: [u16; MOST],
     greys: [u32; MOST + 1],
     weights: [u32; MOST + 1],
+    levels: [u32; 256],
 }
 
 impl Strip {
@@ -41,7 +48,18 @@ impl Strip {
             ends: [0; MOST],
             greys: [0; MOST + 1],
             weights: [0; MOST + 1],
+            levels: [0; 256],
         }
+    }
+
+    /// What each grey level stands for, where it is not itself that is added up.
+    pub(super) const fn set_levels(&mut self, levels: &[u32; 256]) {
+        self.levels = *levels;
+    }
+
+    /// What a grey level stands for.
+    pub(super) fn level(&self, grey: u8) -> u32 {
+        self.levels[usize::from(grey)]
     }
 
     /// Finds the voxel of every pixel, and the runs of pixels that fall into one; gives how many runs.

@@ -8,9 +8,13 @@
 mod pair;
 mod thumb;
 
+use std::ops::Range;
+
+use probepath_frames::World;
+use probepath_us_capture::PixelMap;
 use rayon::prelude::*;
 
-use pair::Pair;
+pub(super) use pair::Pair;
 use thumb::Thumb;
 
 use super::clip::Clip;
@@ -21,44 +25,69 @@ const ROOM_BYTES: usize = 1 << 20;
 /// Bits of a sum's count of pairs.
 const COUNT: u32 = 20;
 
-/// Images, and which of them have something swept between them.
+/// Images as they are looked at from the holes between them.
+#[derive(Default)]
 pub(super) struct Sweep {
-    thumbs: Vec<Thumb>,
+    images: Vec<Kept>,
     clips: Vec<Clip>,
-    pairs: Vec<Pair>,
+}
+
+/// What is kept of an image.
+struct Kept {
+    map: PixelMap<World>,
+    clip: usize,
+    thumb: Thumb,
 }
 
 impl Sweep {
-    pub(super) fn of(slices: &[Slice<'_>], grid: &Grid, settings: &VolumeSettings, swept: Swept) -> Self {
-        let mut sweep = Self { thumbs: Vec::new(), clips: Vec::new(), pairs: Vec::new() };
-        let owns: Vec<usize> = slices.iter().map(|slice| sweep.clip(slice, settings)).collect();
-        let clips = &sweep.clips;
-        let thumb = |(slice, own): (&Slice<'_>, &usize)| Thumb::of(slice, clips.get(*own)?, grid).into();
-        let thumbs: Vec<Option<Thumb>> = slices.par_iter().zip(&owns).map(thumb).collect();
-        let neighbours = slices.windows(2).zip(owns.windows(2)).enumerate();
-        sweep.pairs = neighbours
-            .filter(|(_, (_, own))| own[0] == own[1])
-            .filter_map(|(number, (two, own))| {
-                let [first, second] = two else { return None };
-                Pair::between(number, [first, second], own[0], clips.get(own[0])?, grid, swept)
-            })
-            .collect();
-        sweep.thumbs = thumbs.into_iter().flatten().collect();
+    pub(super) fn of(slices: &[Slice<'_>], grid: &Grid, settings: &VolumeSettings) -> Self {
+        let mut sweep = Self::default();
+        let own: Vec<usize> = slices.iter().map(|slice| sweep.clip(slice, settings)).collect();
+        let Self { images, clips } = &mut sweep;
+        let kept = slices.par_iter().zip(own).filter_map(|(slice, clip)| {
+            Some(Kept { map: slice.map, clip, thumb: Thumb::of(slice, clips.get(clip)?, grid) })
+        });
+        *images = kept.collect();
         sweep
     }
 
-    /// The number of the clip for images of this one's size.
+    /// One image more.
+    pub(super) fn push(&mut self, slice: &Slice<'_>, grid: &Grid, settings: &VolumeSettings) {
+        let clip = self.clip(slice, settings);
+        if let Some(own) = self.clips.get(clip) {
+            let thumb = Thumb::of(slice, own, grid);
+            self.images.push(Kept { map: slice.map, clip, thumb });
+        }
+    }
+
     fn clip(&mut self, slice: &Slice<'_>, settings: &VolumeSettings) -> usize {
         let size = (slice.width, slice.height());
-        let known = self.clips.iter().position(|c| (c.width, c.height) == size);
-        known.unwrap_or_else(|| {
-            self.clips.push(Clip::of(&settings.region, size.0, size.1));
-            self.clips.len() - 1
-        })
+        Clip::number(&mut self.clips, size, |width, height| Clip::of(&settings.region, width, height))
+    }
+
+    /// What is kept (bytes).
+    pub(super) fn bytes(&self) -> u64 {
+        self.images.iter().map(|image| image.thumb.bytes()).sum()
+    }
+
+    /// The neighbours between which something was swept.
+    pub(super) fn pairs(&self, grid: &Grid, swept: Swept) -> Vec<Pair> {
+        let pair = |(number, two): (usize, &[Kept])| {
+            let [first, second] = two else { return None };
+            let clip = self.clips.get(first.clip).filter(|_| first.clip == second.clip)?;
+            Pair::between((number, first.clip), [&first.map, &second.map], clip, grid, swept)
+        };
+        self.images.windows(2).enumerate().filter_map(pair).collect()
     }
 
     /// Fills the layers from `first` on. Every voxel is on its own, so any cutting into layers gives the same.
-    pub(super) fn fill(&self, grid: &Grid, first: usize, (grey, marks): (&mut [u8], &mut [Mark])) {
+    pub(super) fn fill(
+        &self,
+        pairs: &[Pair],
+        grid: &Grid,
+        first: usize,
+        (grey, marks): (&mut [u8], &mut [Mark]),
+    ) {
         let [nx, ny, _] = grid.size;
         let chunk = chunk_layers(grid) * nx * ny;
         let chunks = grey.par_chunks_mut(chunk).zip(marks.par_chunks_mut(chunk)).enumerate();
@@ -67,16 +96,16 @@ impl Sweep {
             let layers = low..low + (grey.len() / (nx * ny)) as i64;
             sums.clear();
             sums.resize(grey.len(), 0);
-            for pair in self.pairs.iter().filter(|pair| pair.touches(&layers)) {
+            for pair in pairs.iter().filter(|pair| pair.touches(&layers)) {
                 self.sweep(pair, &mut Layers { sums, marks, size: [nx, ny], first: low }, &layers);
             }
             finish(sums, grey, marks);
         });
     }
 
-    fn sweep(&self, pair: &Pair, layers: &mut Layers<'_>, range: &std::ops::Range<i64>) {
+    fn sweep(&self, pair: &Pair, layers: &mut Layers<'_>, range: &Range<i64>) {
         let (Some(clip), Some(first), Some(second)) =
-            (self.clips.get(pair.clip), self.thumbs.get(pair.number), self.thumbs.get(pair.number + 1))
+            (self.clips.get(pair.clip), self.images.get(pair.number), self.images.get(pair.number + 1))
         else {
             return;
         };
@@ -86,7 +115,7 @@ impl Sweep {
                 let (Some(sum), Some(Mark::Unseen)) = (sums.get_mut(x), marks.get(x)) else { continue };
                 let Some((t, u, v)) = pair.passing([x as f64, y as f64, z as f64]) else { continue };
                 if clip.holds(u, v)
-                    && let Some(value) = between(first.at(u, v), second.at(u, v), t)
+                    && let Some(value) = between(first.thumb.at(u, v), second.thumb.at(u, v), t)
                 {
                     *sum += (value << COUNT) | 1;
                 }

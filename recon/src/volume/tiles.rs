@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::splat::{self, Walk};
-use super::swept::{self, Sweep};
+use super::swept::{self, Pair, Sweep};
 use super::{Grid, Holes, Mark, Slice, Volume, VolumeError, VolumeSettings, holes};
 
 /// The parts of a volume along z, in their order, each a [`Volume`] on its own part of the grid. Together they are what
@@ -12,7 +12,7 @@ pub struct Tiles<'a> {
     pub(super) grid: Grid,
     settings: VolumeSettings,
     walk: Walk<'a>,
-    sweep: Option<Sweep>,
+    sweep: Option<(Sweep, Vec<Pair>)>,
     layers: usize,
     memory_bytes: u64,
     next: usize,
@@ -46,7 +46,11 @@ impl<'a> Tiles<'a> {
     ) -> Result<Self, VolumeError> {
         let walk = Walk::prepare(slices, &grid, settings)?;
         let sweep = match settings.holes {
-            Some(Holes::Swept(swept)) => Some(Sweep::of(slices, &grid, settings, swept)),
+            Some(Holes::Swept(swept)) => {
+                let sweep = Sweep::of(slices, &grid, settings);
+                let pairs = sweep.pairs(&grid, swept);
+                Some((sweep, pairs))
+            }
             _ => None,
         };
         Ok(Self { grid, settings: settings.clone(), walk, sweep, layers, memory_bytes, next: 0 })
@@ -75,7 +79,7 @@ impl<'a> Tiles<'a> {
         let Volume { grey, marks, .. } = &mut volume;
         splat::splat(&self.walk, &self.grid, &self.settings, around.start, (grey, marks));
         match (&self.sweep, self.settings.holes) {
-            (Some(sweep), _) => sweep.fill(&self.grid, around.start, (grey, marks)),
+            (Some((sweep, pairs)), _) => sweep.fill(pairs, &self.grid, around.start, (grey, marks)),
             (None, Some(Holes::Sticks(sticks))) => holes::fill(&mut volume, sticks),
             (None, _) => {}
         }

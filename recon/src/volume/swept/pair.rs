@@ -3,9 +3,11 @@
 use std::ops::Range;
 
 use nalgebra::Vector3;
+use probepath_frames::World;
+use probepath_us_capture::PixelMap;
 
 use super::super::clip::Clip;
-use super::super::{Grid, Slice, Swept};
+use super::super::{Grid, Swept};
 
 /// A place is found to this part of a voxel.
 const CLOSE: f64 = 1e-3;
@@ -22,7 +24,7 @@ struct Plane {
 
 /// Two neighbouring images.
 #[derive(Clone, Debug)]
-pub(super) struct Pair {
+pub(in super::super) struct Pair {
     /// Of the first.
     pub(super) number: usize,
     pub(super) clip: usize,
@@ -35,9 +37,9 @@ pub(super) struct Pair {
 }
 
 impl Plane {
-    fn of(slice: &Slice<'_>, grid: &Grid) -> Self {
-        let origin = grid.in_voxels(slice.map.at(0.0, 0.0).vector() - grid.origin.vector());
-        let steps = [slice.map.column_step(), slice.map.row_step()].map(|step| grid.in_voxels(step));
+    fn of(map: &PixelMap<World>, grid: &Grid) -> Self {
+        let origin = grid.in_voxels(map.at(0.0, 0.0).vector() - grid.origin.vector());
+        let steps = [map.column_step(), map.row_step()].map(|step| grid.in_voxels(step));
         Self { origin, column: steps[0], row: steps[1] }
     }
 
@@ -67,9 +69,8 @@ impl Plane {
 impl Pair {
     /// `None` when nothing was swept: too far apart, nothing of them is used, or all outside the grid.
     pub(super) fn between(
-        number: usize,
-        slices: [&Slice<'_>; 2],
-        own: usize,
+        (number, own): (usize, usize),
+        maps: [&PixelMap<World>; 2],
         clip: &Clip,
         grid: &Grid,
         swept: Swept,
@@ -79,11 +80,11 @@ impl Pair {
         let (left, right) = (columns.start as f64 - 0.5, columns.end as f64 - 0.5);
         let (top, bottom) = (rows.start as f64 - 0.5, rows.end as f64 - 0.5);
         let corners = [(left, top), (right, top), (left, bottom), (right, bottom)];
-        let way = |(u, v): (f64, f64)| slices[0].map.at(u, v).distance(&slices[1].map.at(u, v));
+        let way = |(u, v): (f64, f64)| maps[0].at(u, v).distance(&maps[1].at(u, v));
         if !corners.iter().all(|corner| way(*corner) <= swept.longest_m) {
             return None;
         }
-        let [first, second] = slices.map(|slice| Plane::of(slice, grid));
+        let [first, second] = maps.map(|map| Plane::of(map, grid));
         let change = Plane {
             origin: second.origin - first.origin,
             column: second.column - first.column,

@@ -31,6 +31,11 @@ pub(super) fn bytes(slice: &Slice<'_>, grid: &Grid) -> u64 {
 }
 
 impl Thumb {
+    /// What it takes (bytes).
+    pub(super) fn bytes(&self) -> u64 {
+        (self.cells.len() * size_of::<u16>()) as u64
+    }
+
     pub(super) fn of(slice: &Slice<'_>, clip: &Clip, grid: &Grid) -> Self {
         let [across, down] = block(slice, grid);
         let (columns, rows) = (slice.width.div_ceil(across), slice.height().div_ceil(down));
