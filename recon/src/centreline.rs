@@ -21,6 +21,8 @@ const KNOT_M: f64 = 3e-3;
 const SAMPLE_M: f64 = 0.25e-3;
 /// The least length that makes a vessel (m).
 const LEAST_M: f64 = 3e-3;
+/// No leg's artery is longer (m): what is has been put together from poses that jump, or are not in metres.
+const LONGEST_M: f64 = 3.0;
 /// How often the centres are placed along the curve anew and the curve is laid anew.
 const ROUNDS: usize = 3;
 /// A centre farther from the curve than this says nothing about where the curve ends (m).
@@ -118,6 +120,9 @@ impl Centreline {
             let span_mm = if end > start { (end - start) * 1e3 } else { 0.0 };
             return Err(ReconError::NoLength { span_mm, needed_mm: LEAST_M * 1e3 });
         }
+        if end - start > LONGEST_M {
+            return Err(no_fit());
+        }
         let knots = Knots::over(start, end, KNOT_M);
         let coefficients = smooth::smooth(&knots, places, centres).ok_or_else(no_fit)?;
         let curve = |(first, weights): (usize, [f64; 4])| -> Vector3<f64> {
@@ -205,6 +210,11 @@ impl Centreline {
     fn distance(&self, place: &Vector3<f64>, at_m: f64) -> f64 {
         let point = self.between(at_m).map(|(a, b, t)| a.point.vector().lerp(&b.point.vector(), t));
         point.map_or(f64::INFINITY, |point| (place - point).norm())
+    }
+
+    /// How far a place is from the nearest sample (m).
+    pub(crate) fn distance_to(&self, place: &Vector3<f64>) -> f64 {
+        self.nearest(place).map_or(f64::INFINITY, |near| (near.point.vector() - place).norm())
     }
 
     /// Where along the curve the sample nearest to a place lies (m).

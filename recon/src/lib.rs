@@ -27,6 +27,7 @@ mod centreline;
 mod compare;
 mod error;
 pub mod fast_marching;
+mod live;
 mod lumen;
 mod mesh;
 mod patch;
@@ -50,6 +51,7 @@ pub use compare::{
     compare, unrolled,
 };
 pub use error::ReconError;
+pub use live::{AreaSoFar, LiveLumen, VesselSoFar, View};
 pub use lumen::{Contour, ImageLumen, LumenFinder, NoLumen, Tracker, segment};
 pub use mesh::{Mesh, MeshError, PointScalars};
 pub use reconstruct::{

@@ -11,11 +11,6 @@ use crate::surface::LumenSurface;
 use crate::vessel::{self, Fitted, Vessel};
 use crate::{Contour, ImageLumen, LumenSettings, Mesh, NoLumen, ReconError, Section, Stenosis, segment};
 
-/// A contour whose centre is farther than this from the smooth centreline is of something else (m).
-const FAR_M: f64 = 3e-3;
-/// The least number of contours that make a surface.
-const LEAST_CONTOURS: usize = 4;
-
 /// The lumen in 3D, with everything measured on it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LumenReconstruction {
@@ -189,7 +184,8 @@ fn with_branches(
         all(lumens).map(|(_, contour)| contour.vessel).filter(|&v| v != 0).collect();
     let (mut vessels, mut warnings) = (vec![first], Vec::new());
     for number in numbers {
-        match Fitted::branch(&contours(lumens, number), &vessels) {
+        let contours: Vec<&Contour> = shown(lumens, number).into_iter().map(|(_, contour)| contour).collect();
+        match Fitted::branch(&contours, &vessels) {
             Ok((fitted, parent)) => {
                 let branch = fitted.vessel(number, settings).rooted(&vessels, parent);
                 if branch.leaves.is_none() {
@@ -203,7 +199,8 @@ fn with_branches(
     (vessels, warnings)
 }
 
-fn check(image: &PlacedBScan) -> Result<(), ReconError> {
+/// Whether an image has a size and a place.
+pub(crate) fn check(image: &PlacedBScan) -> Result<(), ReconError> {
     let number = image.bscan.number;
     let setting = &image.bscan.setting;
     let bad = |what| Err(ReconError::Image { number, what });
@@ -220,42 +217,33 @@ fn check(image: &PlacedBScan) -> Result<(), ReconError> {
     if image.world_from_image.is_finite() { Ok(()) } else { bad("its pose") }
 }
 
-/// The vessel; contours far from its centreline lose their place.
+/// The first vessel; contours far from it lose their place.
 fn fitted(lumens: &mut [ImageLumen]) -> Result<Fitted, ReconError> {
-    loop {
-        let contours = contours(lumens, 0);
-        if contours.len() < LEAST_CONTOURS {
-            return Err(too_few(lumens, contours.len()));
-        }
-        let fitted = Fitted::to(&contours)?;
-        let mut refused = false;
-        for image in lumens.iter_mut() {
-            let Ok(contour) = &image.lumen else { continue };
-            let place = contour.centre.vector();
-            let by =
-                fitted.centreline.nearest(&place).map_or(0.0, |near| (near.point.vector() - place).norm());
-            if by > FAR_M {
-                image.lumen = Err(NoLumen::Jump { by_mm: by * 1e3 });
-                refused = true;
-            }
-        }
-        if !refused {
-            return Ok(fitted);
-        }
+    let shown = shown(lumens, 0);
+    let contours: Vec<&Contour> = shown.iter().map(|(_, contour)| *contour).collect();
+    let found = Fitted::to(&contours);
+    if let Err(ReconError::TooFew { seen, needed, .. }) = found {
+        return Err(too_few(lumens, seen, needed));
     }
+    let (fitted, strays) = found?;
+    let strays: Vec<(usize, f64)> = strays.into_iter().map(|(i, by)| (shown[i].0, by)).collect();
+    for (image, by) in strays {
+        lumens[image].lumen = Err(NoLumen::Jump { by_mm: by * 1e3 });
+    }
+    Ok(fitted)
 }
 
-/// Every contour, with its image's number.
-fn all(lumens: &[ImageLumen]) -> impl Iterator<Item = (u64, &Contour)> {
-    lumens.iter().flat_map(|image| {
-        image.lumen.as_ref().ok().into_iter().chain(&image.others).map(|contour| (image.number, contour))
+/// Every contour, with its image's place among all.
+fn all(lumens: &[ImageLumen]) -> impl Iterator<Item = (usize, &Contour)> {
+    lumens.iter().enumerate().flat_map(|(i, image)| {
+        image.lumen.as_ref().ok().into_iter().chain(&image.others).map(move |contour| (i, contour))
     })
 }
 
-/// The contours of one vessel by the numbers of their images; by their places where numbers are the same, so that the
-/// order of the images says nothing.
-fn contours(lumens: &[ImageLumen], vessel: usize) -> Vec<&Contour> {
-    let mut seen: Vec<(u64, &Contour)> =
+/// The contours of one vessel, with their images' places among all, by the numbers of the images; by where they lie
+/// where numbers are the same, so that the order of the images says nothing.
+fn shown(lumens: &[ImageLumen], vessel: usize) -> Vec<(usize, &Contour)> {
+    let mut shown: Vec<(usize, &Contour)> =
         all(lumens).filter(|(_, contour)| contour.vessel == vessel).collect();
     let key = |contour: &Contour| {
         let first = contour.world.first().map_or([0.0; 3], |point| point.vector().into());
@@ -266,18 +254,19 @@ fn contours(lumens: &[ImageLumen], vessel: usize) -> Vec<&Contour> {
         let pairs = key(a).zip(key(b)).map(|(a, b)| a.total_cmp(&b));
         pairs.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
     };
-    seen.sort_by(|a, b| a.0.cmp(&b.0).then_with(|| by_place(a.1, b.1)));
-    seen.into_iter().map(|(_, contour)| contour).collect()
+    let number = |i: usize| lumens[i].number;
+    shown.sort_by(|a, b| number(a.0).cmp(&number(b.0)).then_with(|| by_place(a.1, b.1)));
+    shown
 }
 
-fn too_few(lumens: &[ImageLumen], seen: usize) -> ReconError {
+fn too_few(lumens: &[ImageLumen], seen: usize, needed: usize) -> ReconError {
     let counts = counts(lumens);
     let most = counts.reasons.iter().max_by_key(|(_, count)| **count);
-    let reason = most.map_or_else(|| "none".into(), |(reason, _)| reason.clone());
-    ReconError::TooFew { seen, images: lumens.len(), needed: LEAST_CONTOURS, reason }
+    let reason = most.map_or_else(|| "away from its neighbours".into(), |(reason, _)| reason.clone());
+    ReconError::TooFew { seen, images: lumens.len(), needed, reason }
 }
 
-fn counts(lumens: &[ImageLumen]) -> ImageCounts {
+pub(crate) fn counts(lumens: &[ImageLumen]) -> ImageCounts {
     let mut counts = ImageCounts { images: lumens.len(), ..ImageCounts::default() };
     for why in lumens.iter().filter_map(|image| image.lumen.as_ref().err()) {
         counts.without_lumen += 1;

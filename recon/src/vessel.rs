@@ -19,6 +19,10 @@ use crate::{Contour, LumenSettings, ReconError, ReconWarning, Section, Stenosis,
 const SECTION_STEP_M: f64 = 0.5e-3;
 /// How often the centreline is moved to the middle of what is round it.
 const ROUNDS: usize = 2;
+/// A contour whose centre is farther than this from the smooth centreline is of something else (m).
+const FAR_M: f64 = 3e-3;
+/// The least number of contours that make a surface.
+const LEAST_CONTOURS: usize = 4;
 
 /// The artery that was followed, or a branch of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,19 +79,50 @@ pub(crate) struct Fitted {
 }
 
 impl Fitted {
-    /// From contours in the order of their images.
-    pub(crate) fn to(contours: &[&Contour]) -> Result<Self, ReconError> {
-        let centres: Vec<Vector3<f64>> = contours.iter().map(|contour| contour.centre.vector()).collect();
-        Self::along(Centreline::through(&centres)?, contours)
+    /// From contours in the order of their images. Also which of them are far from the vessel, and how far (m): they
+    /// are left out.
+    ///
+    /// # Errors
+    /// When fewer than four are left, or they span no length.
+    pub(crate) fn to(contours: &[&Contour]) -> Result<(Self, Vec<(usize, f64)>), ReconError> {
+        Self::settled(contours, Ok)
     }
 
     /// A branch: it begins at the end that is nearer to one of `vessels`. Also which of them.
     pub(crate) fn branch(contours: &[&Contour], vessels: &[Vessel]) -> Result<(Self, usize), ReconError> {
-        let centres: Vec<Vector3<f64>> = contours.iter().map(|contour| contour.centre.vector()).collect();
-        let line = Centreline::through(&centres)?;
-        let (parent, at_end) = root::parent(&line, vessels).ok_or(ReconError::NoFit { what: "branch" })?;
-        let line = if at_end { line.reversed() } else { line };
-        Ok((Self::along(line, contours)?, parent))
+        let parent =
+            |line: &Centreline| root::parent(line, vessels).ok_or(ReconError::NoFit { what: "branch" });
+        let from_parent = |line: Centreline| Ok(if parent(&line)?.1 { line.reversed() } else { line });
+        let (fitted, _) = Self::settled(contours, from_parent)?;
+        let (parent, _) = parent(&fitted.centreline)?;
+        Ok((fitted, parent))
+    }
+
+    /// Lays the vessel through the contours, and again without those that are far from it.
+    fn settled(
+        contours: &[&Contour],
+        turned: impl Fn(Centreline) -> Result<Centreline, ReconError>,
+    ) -> Result<(Self, Vec<(usize, f64)>), ReconError> {
+        let (mut kept, mut strays): (Vec<usize>, Vec<(usize, f64)>) =
+            ((0..contours.len()).collect(), Vec::new());
+        loop {
+            if kept.len() < LEAST_CONTOURS {
+                let (seen, images) = (kept.len(), contours.len());
+                let reason = "away from its neighbours".into();
+                return Err(ReconError::TooFew { seen, images, needed: LEAST_CONTOURS, reason });
+            }
+            let these: Vec<&Contour> = kept.iter().map(|&i| contours[i]).collect();
+            let centres: Vec<Vector3<f64>> = these.iter().map(|contour| contour.centre.vector()).collect();
+            let fitted = Self::along(turned(Centreline::through(&centres)?)?, &these)?;
+            let off = |i: &usize| fitted.centreline.distance_to(&contours[*i].centre.vector());
+            let far: Vec<(usize, f64)> =
+                kept.iter().map(|i| (*i, off(i))).filter(|(_, by)| by.is_nan() || *by > FAR_M).collect();
+            if far.is_empty() {
+                return Ok((fitted, strays));
+            }
+            kept.retain(|i| far.iter().all(|(stray, _)| stray != i));
+            strays.extend(far);
+        }
     }
 
     /// The tube along a first guess of the centreline, which moves to the middle of what is round it.
@@ -119,11 +154,22 @@ impl Fitted {
         pairs.map(gap).chain(runs.map(branch)).chain(disagreement).collect()
     }
 
+    /// Whether images show the lumen at a length (m).
+    pub(crate) fn is_measured(&self, at: f64, longest_gap_m: f64) -> bool {
+        is_measured(&self.seen, at, longest_gap_m)
+    }
+
+    /// The surface as a grid.
+    pub(crate) fn grid(&self, settings: &LumenSettings) -> LumenSurface {
+        let measured = |at: f64| self.is_measured(at, settings.longest_gap_m);
+        surface::grid(&self.centreline, &self.tube, settings.grid, measured)
+    }
+
     /// The vessel with its grid and measures.
     pub(crate) fn vessel(self, number: usize, settings: &LumenSettings) -> Vessel {
+        let surface = self.grid(settings);
         let Self { centreline, tube, seen, .. } = self;
         let measured = |at: f64| is_measured(&seen, at, settings.longest_gap_m);
-        let surface = surface::grid(&centreline, &tube, settings.grid, measured);
         let sections = section::sections(&centreline, &tube, SECTION_STEP_M, measured);
         let stenoses = stenosis::find(&sections, settings.least_percent_area);
         let longest_gap_m = settings.longest_gap_m;

@@ -21,8 +21,6 @@ const KNOT_M: f64 = 2e-3;
 /// How sharply radii bend along the vessel (1/m), and over which length (m).
 pub(super) const BEND: f64 = 80.0;
 pub(super) const BEND_M: f64 = 5e-3;
-/// No leg's artery is longer (m): what is has been put together from poses that jump.
-const LONGEST_M: f64 = 3.0;
 /// No lumen is drawn narrower (m).
 const LEAST_RADIUS_M: f64 = 0.05e-3;
 
@@ -62,6 +60,13 @@ impl Shape {
     /// Distance from the centreline at a length, in the direction of a cosine and sine (m).
     pub(crate) fn radius(&self, at: f64, turn: (f64, f64)) -> f64 {
         radius(&self.section(at), turn)
+    }
+
+    /// Area of the section at a length (m2): the integral of half the distance's square.
+    pub(crate) fn area(&self, at: f64) -> f64 {
+        let section = self.section(at);
+        let squares: f64 = section.iter().map(|value| value * value).sum();
+        std::f64::consts::PI * (section[0] * section[0] + squares) / 2.0
     }
 
     /// The centre of gravity of the section at a length, along its `up` and `side` (m).
@@ -135,6 +140,13 @@ impl Tube {
         self.shape.radius(at, (angle.cos(), angle.sin()))
     }
 
+    /// Area of the section at a length and its standard deviation (m2).
+    pub(crate) fn area(&self, at: f64) -> (f64, f64) {
+        let mut slope = SVector::from(self.section(at)) * std::f64::consts::PI;
+        slope[0] *= 2.0;
+        (self.shape.area(at), slope.dot(&(self.covariance(at) * slope)).max(0.0).sqrt())
+    }
+
     /// The points of the surface round a point of the centreline, at angles given by sine and cosine.
     pub(crate) fn ring(&self, centre: &CentrelinePoint, angles: &[(f64, f64)]) -> Vec<Point<World>> {
         let section = self.section(centre.at_m);
@@ -159,7 +171,7 @@ const NO_FIT: ReconError = ReconError::NoFit { what: "lumen surface" };
 fn solve(contours: &[Samples]) -> Option<(Shape, Factor)> {
     let places = contours.iter().flat_map(|contour| &contour.points).map(|point| point.at);
     let (start, end) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), at| (a.min(at), b.max(at)));
-    if !(end > start && end - start < LONGEST_M) {
+    if end.is_nan() || end <= start {
         return None;
     }
     let knots = Knots::over(start, end, KNOT_M);

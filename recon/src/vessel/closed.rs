@@ -8,7 +8,6 @@ use nalgebra::Vector3;
 use super::Vessel;
 use crate::Mesh;
 use crate::centreline::CentrelinePoint;
-use crate::surface::AROUND;
 use solid::Solid;
 
 /// Distance of the rings (m), and points in each.
@@ -57,7 +56,7 @@ fn tube(vessel: &Vessel) -> Mesh {
     let mut scalars = Scalars::default();
     let mut caps = [(0.0, 0.0, 0.0); 2];
     for (row, centre) in centres.iter().enumerate() {
-        let area = area(&tube.section(centre.at_m));
+        let area = tube.shape().area(centre.at_m);
         let seen = vessel.is_measured(centre.at_m);
         let ring = tube.ring(centre, &angles);
         let covariance = tube.covariance(centre.at_m);
@@ -72,12 +71,6 @@ fn tube(vessel: &Vessel) -> Mesh {
     }
     caps.into_iter().for_each(|(area, r, sd)| scalars.push(area, r, sd));
     scalars.on(Mesh::tube(&points, (centres.len(), RING)))
-}
-
-/// Area of a section from its harmonics (m2): the integral of half the distance's square.
-fn area(section: &[f64; AROUND]) -> f64 {
-    let others: f64 = section.iter().skip(1).map(|value| value * value).sum();
-    std::f64::consts::PI * (section[0] * section[0] + others / 2.0)
 }
 
 /// Several vessels: the border of what lies inside any of them.

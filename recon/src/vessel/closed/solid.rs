@@ -3,7 +3,6 @@
 use nalgebra::Vector3;
 
 use super::super::Vessel;
-use super::area;
 use crate::centreline::Centreline;
 use crate::surface::SectionCovariance;
 
@@ -87,6 +86,6 @@ impl<'a> Solid<'a> {
         }
         let covariance = self.covariances.get((seen.at / STEP_M).round() as usize);
         let sd = covariance.map_or(none, |covariance| self.vessel.tube.sd(covariance, seen.turn));
-        (area(&self.vessel.tube.section(seen.at)), r, sd)
+        (self.vessel.tube.shape().area(seen.at), r, sd)
     }
 }
