@@ -37,6 +37,7 @@ mod settings;
 mod spline;
 mod stenosis;
 mod surface;
+mod uncertainty;
 mod vessel;
 pub mod volume;
 
@@ -57,8 +58,8 @@ pub use mesh::{Mesh, MeshError, PointScalars};
 pub use reconstruct::{
     ImageCounts, LumenReconstruction, ReconWarning, check_sweep, reconstruct_from, reconstruct_lumen,
 };
-pub use section::{Section, SectionMeasure};
+pub use section::{NotMeasured, Section, SectionMeasure};
 pub use settings::{LumenSettings, PointSpread, SeedPoint};
-pub use stenosis::{Reference, ReferenceSide, Stenosis};
+pub use stenosis::{Reference, ReferenceChoice, ReferenceSide, Stenosis};
 pub use surface::LumenSurface;
 pub use vessel::{Leaves, Vessel};

@@ -1,15 +1,22 @@
 //! Sections normal to the centreline, with their areas and diameters.
 
+mod outline;
+
+use std::sync::OnceLock;
+
 use probepath_frames::{Direction, Point, World};
 use serde::{Deserialize, Serialize};
 
-use crate::centreline::Centreline;
+use crate::centreline::{Centreline, CentrelinePoint};
 use crate::surface::Tube;
+use outline::Flat;
 
 /// Points of a section's outline.
 const OUTLINE: usize = 72;
-/// Directions in which a section's width is measured.
-const WIDTHS: usize = 90;
+/// No radius is smaller (m).
+const LEAST_RADIUS_M: f64 = 0.05e-3;
+/// So many standard deviations on either side hold 95 % of a normal distribution.
+pub(crate) const TWO_SIDED_95: f64 = 1.959_963_984_540_054;
 
 /// The section normal to the centreline at one place.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,23 +27,79 @@ pub struct Section {
     pub centre: Point<World>,
     /// The centreline's direction.
     pub normal: Direction<World>,
-    /// Its measures; nothing where no image shows the lumen.
+    /// The outline's centre of gravity; the centreline's point where nothing is measured.
+    pub middle: Point<World>,
+    /// With what force the probe pressed there (N), where it was measured.
+    pub force_n: Option<f64>,
+    /// Its measures.
     pub measure: Option<SectionMeasure>,
+    /// Why it has none.
+    pub missing: Option<NotMeasured>,
 }
 
-/// How large a section of the lumen is.
+/// Why a section has no measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NotMeasured {
+    /// No image shows the lumen near it.
+    NotSeen,
+    /// The vessel bends so sharply that this section would cross its neighbour inside the lumen.
+    Crossing,
+}
+
+/// How large a section of the lumen is. The outline's border between its 72 points is taken as round for area and
+/// length, as straight for widths and the circle inside (0.1 % less on a round lumen).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SectionMeasure {
     /// Area (mm2).
     pub area_mm2: f64,
     /// Its standard deviation, from the speckle and the poses; no systematic error (mm2).
     pub area_sd_mm2: f64,
+    /// Its standard deviation from what the whole scan shares: wall model, point spread, calibration, lag (mm2).
+    pub area_common_sd_mm2: f64,
+    /// Holds the true area with 95 % probability, from both (mm2).
+    pub area_interval_mm2: [f64; 2],
     /// Diameter of the circle of the same area (mm).
     pub equivalent_diameter_mm: f64,
+    /// Diameter of the largest circle inside the outline (mm).
+    pub inscribed_diameter_mm: f64,
     /// Smallest width (minimum Feret diameter, mm).
     pub least_diameter_mm: f64,
     /// Largest width (maximum Feret diameter, mm).
     pub largest_diameter_mm: f64,
+    /// `4 pi area / length^2` of the outline: 1 for a circle, less for anything else.
+    pub circularity: f64,
+}
+
+impl SectionMeasure {
+    /// The 95 % interval of the equivalent diameter (mm): that of the area, as diameters.
+    pub fn diameter_interval_mm(&self) -> [f64; 2] {
+        self.area_interval_mm2.map(diameter_of)
+    }
+
+    /// Intervals of what has these standard deviations.
+    pub(crate) fn with_sd(self, random_mm2: f64, common_mm2: f64) -> Self {
+        Self {
+            area_sd_mm2: random_mm2,
+            area_common_sd_mm2: common_mm2,
+            area_interval_mm2: area_interval(self.area_mm2, random_mm2.hypot(common_mm2)),
+            ..self
+        }
+    }
+}
+
+/// Diameter of the circle of an area.
+pub(crate) fn diameter_of(area: f64) -> f64 {
+    2.0 * (area / std::f64::consts::PI).sqrt()
+}
+
+/// The 95 % interval of an area of standard deviation `sd`. A border is found to within so many micrometres whatever
+/// the lumen's size, so it is the radius whose error is normal: the interval is that of the radius, squared, and
+/// never negative.
+pub(crate) fn area_interval(area: f64, sd: f64) -> [f64; 2] {
+    let radius = (area / std::f64::consts::PI).sqrt();
+    let reach = TWO_SIDED_95 * sd / (std::f64::consts::TAU * radius).max(f64::MIN_POSITIVE);
+    [(radius - reach).max(0.0), radius + reach].map(|r| std::f64::consts::PI * r * r)
 }
 
 /// Sections every `step` (m), measured where `measured` says so.
@@ -48,46 +111,74 @@ pub(crate) fn sections(
 ) -> Vec<Section> {
     let count = (line.length_m() / step).floor() as usize + 1;
     let centres = (0..count).filter_map(|i| line.at(i as f64 * step));
-    centres
-        .map(|centre| Section {
-            at_mm: centre.at_m * 1e3,
-            centre: centre.point,
-            normal: centre.tangent,
-            measure: measured(centre.at_m).then(|| measure(tube, centre.at_m)),
-        })
-        .collect()
+    centres.map(|centre| section(tube, &centre, measured(centre.at_m))).collect()
 }
 
-fn measure(tube: &Tube, at: f64) -> SectionMeasure {
-    let radii = |k: usize| tube.radius(at, angle(k)).max(0.05e-3);
-    let outline: Vec<(f64, f64)> =
-        (0..OUTLINE).map(|k| (radii(k) * angle(k).cos(), radii(k) * angle(k).sin())).collect();
-    // The border between the points is round: the integral of r^2 / 2, not the polygon.
-    let area = (0..OUTLINE).map(|k| radii(k).powi(2)).sum::<f64>() * std::f64::consts::PI / OUTLINE as f64;
-    let (least, largest) = widths(&outline);
+fn section(tube: &Tube, centre: &CentrelinePoint, measured: bool) -> Section {
+    let radii = radii(tube, centre.at_m);
+    let (area, (x, y)) = area_and_middle(&radii);
+    let middle = centre.point.moved(centre.up, x).moved(centre.side, y);
+    Section {
+        at_mm: centre.at_m * 1e3,
+        centre: centre.point,
+        normal: centre.tangent,
+        middle: if measured { middle } else { centre.point },
+        force_n: None,
+        measure: measured.then(|| measure(&radii, area, tube.radius_sd(centre.at_m))),
+        missing: (!measured).then_some(NotMeasured::NotSeen),
+    }
+}
+
+/// Area of a round outline, and its centre of gravity: the integrals of `r^2 / 2` and of `r^3 / 3` times the
+/// direction. No polygon: the border between the points is round.
+fn area_and_middle(radii: &[f64; OUTLINE]) -> (f64, Flat) {
+    let step = std::f64::consts::TAU / OUTLINE as f64;
+    let area = radii.iter().map(|r| r * r).sum::<f64>() * step / 2.0;
+    let moment = radii.iter().zip(turns()).fold((0.0, 0.0), |sum, (r, (cos, sin))| {
+        let part = r * r * r * step / 3.0;
+        (sum.0 + part * cos, sum.1 + part * sin)
+    });
+    (area, (moment.0 / area, moment.1 / area))
+}
+
+fn measure(radii: &[f64; OUTLINE], area: f64, radius_sd: f64) -> SectionMeasure {
+    let outline: Vec<Flat> = radii.iter().zip(turns()).map(|(r, (cos, sin))| (r * cos, r * sin)).collect();
+    let (least, largest) = outline::widths(&outline);
+    let (_, inscribed) = outline::inscribed_circle(&outline, (0.0, 0.0));
     let mean = (area / std::f64::consts::PI).sqrt();
-    SectionMeasure {
-        area_mm2: area * 1e6,
-        area_sd_mm2: std::f64::consts::TAU * mean * tube.radius_sd(at) * 1e6,
+    let (area_mm2, sd_mm2) = (area * 1e6, std::f64::consts::TAU * mean * radius_sd * 1e6);
+    let measure = SectionMeasure {
+        area_mm2,
+        area_sd_mm2: 0.0,
+        area_common_sd_mm2: 0.0,
+        area_interval_mm2: [area_mm2; 2],
         equivalent_diameter_mm: 2.0 * mean * 1e3,
+        inscribed_diameter_mm: 2.0 * inscribed * 1e3,
         least_diameter_mm: least * 1e3,
         largest_diameter_mm: largest * 1e3,
-    }
+        circularity: (4.0 * std::f64::consts::PI * area / outline::length(&outline).powi(2)).min(1.0),
+    };
+    measure.with_sd(sd_mm2, 0.0)
+}
+
+/// Distances of the outline's points from the centreline.
+fn radii(tube: &Tube, at: f64) -> [f64; OUTLINE] {
+    std::array::from_fn(|k| tube.radius(at, angle(k)).max(LEAST_RADIUS_M))
 }
 
 fn angle(k: usize) -> f64 {
     std::f64::consts::TAU * k as f64 / OUTLINE as f64
 }
 
-/// Smallest and largest width of an outline.
-fn widths(outline: &[(f64, f64)]) -> (f64, f64) {
-    let width = |k: usize| {
-        let (sin, cos) = (std::f64::consts::PI * k as f64 / WIDTHS as f64).sin_cos();
-        let along = outline.iter().map(|p| p.0 * cos + p.1 * sin);
-        let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
-        high - low
-    };
-    (0..WIDTHS).map(width).fold((f64::INFINITY, 0.0), |(a, b), w| (a.min(w), f64::max(b, w)))
+/// Cosine and sine of the outline's angles.
+fn turns() -> &'static [(f64, f64); OUTLINE] {
+    static TURNS: OnceLock<[(f64, f64); OUTLINE]> = OnceLock::new();
+    TURNS.get_or_init(|| {
+        std::array::from_fn(|k| {
+            let (sin, cos) = angle(k).sin_cos();
+            (cos, sin)
+        })
+    })
 }
 
 #[cfg(test)]
@@ -95,10 +186,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_widths_of_an_ellipse_are_its_axes() {
-        let outline: Vec<(f64, f64)> =
-            (0..OUTLINE).map(|k| (3.0 * angle(k).cos(), 2.0 * angle(k).sin())).collect();
-        let (least, largest) = widths(&outline);
-        assert!((least - 4.0).abs() < 0.01 && (largest - 6.0).abs() < 0.01, "{least} {largest}");
+    fn the_interval_of_an_area_is_that_of_its_radius() {
+        let [low, high] = area_interval(std::f64::consts::PI * 4.0, std::f64::consts::TAU * 2.0 * 0.1);
+        assert!((diameter_of(low) / 2.0 - (2.0 - 0.196)).abs() < 1e-4, "{low}");
+        assert!((diameter_of(high) / 2.0 - (2.0 + 0.196)).abs() < 1e-4, "{high}");
+        assert!(area_interval(1e-3, 1.0)[0] == 0.0 && area_interval(0.0, 0.0)[1] == 0.0);
     }
 }

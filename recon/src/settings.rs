@@ -3,7 +3,7 @@
 use probepath_us_capture::Setting;
 use serde::{Deserialize, Serialize};
 
-use crate::ReconError;
+use crate::{ReconError, ReferenceChoice};
 
 /// How a lumen is looked for and measured. The default is meant to need no change on leg arteries.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -27,6 +27,8 @@ pub struct LumenSettings {
     pub longest_gap_m: f64,
     /// The least percent area that is called a stenosis.
     pub least_percent_area: f64,
+    /// What stenoses are measured against.
+    pub reference: ReferenceChoice,
 }
 
 /// A place inside a lumen, in an image.
@@ -60,6 +62,7 @@ impl Default for LumenSettings {
             grid: (300, 20),
             longest_gap_m: 0.004,
             least_percent_area: 35.0,
+            reference: ReferenceChoice::default(),
         }
     }
 }
@@ -102,6 +105,12 @@ impl LumenSettings {
         if !(0.0..100.0).contains(&self.least_percent_area) {
             let value = self.least_percent_area;
             return Err(ReconError::Setting { name: "least_percent_area", value, must: "must be in 0..100" });
+        }
+        if let ReferenceChoice::Between { from_mm, to_mm } = self.reference
+            && !(from_mm.is_finite() && to_mm - from_mm >= 2.0 && to_mm.is_finite())
+        {
+            let must = "must begin 2 mm or more before it ends";
+            return Err(ReconError::Setting { name: "reference", value: to_mm - from_mm, must });
         }
         Ok(())
     }

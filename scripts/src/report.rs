@@ -112,20 +112,40 @@ pub struct StenosisRow {
     pub segment: String,
     /// Lost area, percent of the reference.
     pub percent_area: f64,
-    /// Its standard deviation, from speckle and poses (points).
+    /// Its standard deviation, from everything known (points).
     pub percent_area_sd: f64,
+    /// Its 95 % interval (percent).
+    pub percent_area_interval: [f64; 2],
     /// Lost diameter, percent of the reference.
     pub percent_diameter: f64,
+    /// Its 95 % interval (percent).
+    pub percent_diameter_interval: [f64; 2],
     /// Grade by percent diameter: 1-19 / 20-49 / 50-99 % / occluded.
     pub grade: String,
     /// Where the lumen is smallest: distance along the centreline from the scan's proximal end (mm).
     pub at_mm: f64,
+    /// Its 95 % interval (mm).
+    pub at_interval_mm: [f64; 2],
     /// Length of the narrowing (mm).
     pub length_mm: f64,
+    /// Its 95 % interval (mm).
+    pub length_interval_mm: [f64; 2],
+    /// Whether it runs on beyond what was measured.
+    pub cut_off: bool,
     /// Smallest lumen area (mm2).
     pub min_area_mm2: f64,
+    /// Its 95 % interval (mm2).
+    pub min_area_interval_mm2: [f64; 2],
     /// Diameter of a circle of that area (mm).
     pub min_diameter_mm: f64,
+    /// Its 95 % interval (mm).
+    pub min_diameter_interval_mm: [f64; 2],
+    /// Diameter of the largest circle inside the narrowest section (mm).
+    pub min_inscribed_diameter_mm: f64,
+    /// How far the narrowest lumen lies off the vessel's middle: 0 in the middle, 1 against the wall; none where one
+    /// side of the stenosis was not measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub asymmetry: Option<f64>,
     /// Area of the reference (mm2).
     pub reference_area_mm2: f64,
     /// What the reference is.
@@ -159,6 +179,9 @@ pub struct AreaPoint {
     pub at_mm: f64,
     /// Area of the section normal to it (mm2); none where no section was found.
     pub area_mm2: Option<f64>,
+    /// Its 95 % interval (mm2).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub area_interval_mm2: Option<[f64; 2]>,
 }
 
 /// How the contact force was held, in N.

@@ -1,7 +1,9 @@
 use probepath_frames::{Direction, Point};
 
 use super::*;
-use crate::SectionMeasure;
+use crate::section::{NotMeasured, diameter_of};
+use crate::uncertainty::AreaError;
+use crate::{LumenSettings, Section, SectionMeasure};
 
 /// A narrowing: place (mm), length (mm), part of the area that is missing.
 type Narrowing = (f64, f64, f64);
@@ -25,12 +27,28 @@ fn section(at_mm: f64, area: Option<f64>) -> Section {
     let measure = |area_mm2: f64| SectionMeasure {
         area_mm2,
         area_sd_mm2: 0.5,
-        equivalent_diameter_mm: 0.0,
-        least_diameter_mm: 0.0,
-        largest_diameter_mm: 0.0,
+        area_common_sd_mm2: 0.0,
+        area_interval_mm2: [area_mm2; 2],
+        equivalent_diameter_mm: diameter_of(area_mm2),
+        inscribed_diameter_mm: diameter_of(area_mm2),
+        least_diameter_mm: diameter_of(area_mm2),
+        largest_diameter_mm: diameter_of(area_mm2),
+        circularity: 1.0,
     };
     let centre = Point::new(0.0, 0.0, at_mm * 1e-3);
-    Section { at_mm, centre, normal: Direction::z(), measure: area.map(measure) }
+    let missing = area.is_none().then_some(NotMeasured::NotSeen);
+    let measure = area.map(measure);
+    Section { at_mm, centre, normal: Direction::z(), middle: centre, force_n: None, measure, missing }
+}
+
+/// With the errors that the sections state.
+fn find(sections: &[Section], least_percent_area: f64) -> Vec<Stenosis> {
+    with(sections, &LumenSettings { least_percent_area, ..LumenSettings::default() })
+}
+
+fn with(sections: &[Section], settings: &LumenSettings) -> Vec<Stenosis> {
+    let errors: Vec<AreaError> = sections.iter().map(AreaError::of).collect();
+    super::find(sections, &errors, settings)
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use probepath_recon::{LumenReconstruction, Mesh, MeshError, ReferenceSide, Stenosis};
+use probepath_recon::{LumenReconstruction, Mesh, MeshError, Stenosis};
 use probepath_us_capture::PlacedBScan;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -153,22 +153,23 @@ fn stenosis_row(index: usize, found: &Stenosis, segments: &[Segment]) -> Stenosi
         segment: segment.map(|s| s.name.clone()).unwrap_or_default(),
         percent_area: found.percent_area,
         percent_area_sd: found.percent_area_sd,
+        percent_area_interval: found.percent_area_interval,
         percent_diameter: found.percent_diameter,
+        percent_diameter_interval: found.percent_diameter_interval,
         grade: grade(found.percent_diameter).into(),
         at_mm: found.at_mm,
+        at_interval_mm: found.at_interval_mm,
         length_mm: found.length_mm,
+        length_interval_mm: found.length_interval_mm,
+        cut_off: found.cut_off,
         min_area_mm2: found.min_area_mm2,
+        min_area_interval_mm2: found.min_area_interval_mm2,
         min_diameter_mm: found.min_diameter_mm,
+        min_diameter_interval_mm: found.min_diameter_interval_mm,
+        min_inscribed_diameter_mm: found.minimal_inscribed_diameter_mm,
+        asymmetry: found.asymmetry,
         reference_area_mm2: found.reference_area_mm2,
-        reference: format!(
-            "{} normal segment, {:.0} to {:.0} mm",
-            match found.reference.side {
-                ReferenceSide::Proximal => "proximal",
-                ReferenceSide::Distal => "distal",
-            },
-            found.reference.from_mm,
-            found.reference.to_mm
-        ),
+        reference: found.reference.to_string(),
     }
 }
 
@@ -203,6 +204,7 @@ fn area_curve(recon: &LumenReconstruction) -> Vec<AreaPoint> {
     let point = |section: &probepath_recon::Section| AreaPoint {
         at_mm: section.at_mm,
         area_mm2: section.measure.as_ref().map(|m| m.area_mm2),
+        area_interval_mm2: section.measure.as_ref().map(|m| m.area_interval_mm2),
     };
     recon.sections.iter().map(point).collect()
 }

@@ -112,29 +112,40 @@ fn stenoses(body: &mut String, rows: &[StenosisRow]) {
     }
     body.push_str(
         "<h2>Stenoses</h2><table><thead><tr><th></th><th>Segment</th><th>Area lost</th><th>Diameter lost</th>\
-         <th>Grade</th><th>At</th><th>Length</th><th>Smallest lumen</th><th>Reference</th></tr></thead><tbody>",
+         <th>Grade</th><th>At</th><th>Length</th><th>Smallest lumen</th><th>Off the middle</th><th>Reference</th></tr></thead><tbody>",
     );
     for s in rows {
         let _ = write!(
             body,
-            "<tr><th>{}</th><td>{}</td><td class='n'>{:.1} ± {:.1} %</td><td class='n'>{:.1} %</td><td class='n'>{}</td>\
-             <td class='n'>{:.1} mm</td><td class='n'>{:.1} mm</td><td class='n'>{:.1} mm², {:.1} mm</td>\
-             <td>{:.1} mm², {}</td></tr>",
+            "<tr><th>{}</th><td>{}</td><td class='n'>{:.1} %{}</td><td class='n'>{:.1} %{}</td><td class='n'>{}</td>\
+             <td class='n'>{:.1} mm</td><td class='n'>{:.1} mm{}{}</td><td class='n'>{:.1} mm²{}{:.1} mm{}</td>\
+             <td class='n'>{}</td><td>{:.1} mm², {}</td></tr>",
             escape(&s.name),
             escape(&s.segment),
             s.percent_area,
-            s.percent_area_sd,
+            interval(s.percent_area_interval),
             s.percent_diameter,
+            interval(s.percent_diameter_interval),
             escape(&s.grade),
             s.at_mm,
             s.length_mm,
+            interval(s.length_interval_mm),
+            if s.cut_off { "runs on beyond the scan" } else { "" },
             s.min_area_mm2,
+            interval(s.min_area_interval_mm2),
             s.min_diameter_mm,
+            interval(s.min_diameter_interval_mm),
+            s.asymmetry.map_or_else(|| "not known".to_owned(), |part| format!("{part:.2}")),
             s.reference_area_mm2,
             escape(&s.reference)
         );
     }
     body.push_str("</tbody></table>");
+}
+
+/// A 95 % interval, in small under its number.
+fn interval([low, high]: [f64; 2]) -> String {
+    format!("<small>{low:.1} to {high:.1}</small>")
 }
 
 fn surface(body: &mut String, surface: Option<&Surface>) {
@@ -258,7 +269,7 @@ fn conditions(body: &mut String, report: &Report) {
     body.push_str("</tbody></table>");
     body.push_str(
         "<footer>B-mode lumen geometry, not a Doppler grade. A research tool, not a medical device. Percent of area and \
-         of diameter are against the reference named in the row. Distances are along the centreline from the scan's \
+         of diameter are against the reference named in the row. Two small numbers: the 95 % interval. Distances are along the centreline from the scan's \
          proximal end. Surfaces and volumes: millimetres, LPS.</footer>",
     );
 }
@@ -273,7 +284,7 @@ h1{font-size:24px;margin:0 0 6px}h2{font-size:16px;margin:28px 0 8px}header p{ma
 .warnings{background:#fff6e0;border-left:4px solid #e0a100;margin:12px 0;padding:10px 10px 10px 28px}\
 table{border-collapse:collapse;width:100%;font-size:14px}\
 th,td{text-align:left;padding:5px 8px;border-bottom:1px solid var(--line);vertical-align:top}\
-td.n{white-space:nowrap}svg text.label{font-size:26px;fill:var(--mark);font-weight:600}\
+td.n{white-space:nowrap}td small{display:block;color:var(--soft)}svg text.label{font-size:26px;fill:var(--mark);font-weight:600}\
 thead th{color:var(--soft);font-weight:600}td.n{font-variant-numeric:tabular-nums}\
 .conditions th{width:190px;font-weight:600;color:var(--soft)}.conditions td{overflow-wrap:anywhere}\
 figure{margin:8px 0}img,svg{max-width:100%;height:auto;display:block}figcaption{color:var(--soft);font-size:13px}\

@@ -46,15 +46,17 @@ impl Report {
         }
         writeln!(
             f,
-            "     segment        area lost  diameter lost  grade      at       length    smallest lumen"
+            "     segment        area lost  (95 % interval)  diameter lost  grade      at       length    smallest lumen"
         )?;
         for s in &self.stenoses {
             writeln!(
                 f,
-                "{:<4} {:<14} {:>7.1} %  {:>11.1} %  {:<9} {:>6.1} mm  {:>5.1} mm  {:>5.1} of {:.1} mm²",
+                "{:<4} {:<14} {:>7.1} %  ({:>4.1} to {:>4.1} %)  {:>11.1} %  {:<9} {:>6.1} mm  {:>5.1} mm  {:>5.1} of {:.1} mm²",
                 s.name,
                 s.segment,
                 s.percent_area,
+                s.percent_area_interval[0],
+                s.percent_area_interval[1],
                 s.percent_diameter,
                 s.grade,
                 s.at_mm,
