@@ -29,6 +29,7 @@ mod error;
 pub mod fast_marching;
 mod live;
 mod lumen;
+pub mod measures;
 mod mesh;
 mod patch;
 mod reconstruct;
@@ -45,6 +46,8 @@ pub mod volume;
 mod phantom_contours;
 #[cfg(test)]
 mod phantom_images;
+#[cfg(test)]
+mod phantom_scans;
 
 pub use centreline::{Centreline, CentrelinePoint};
 pub use compare::{
@@ -62,4 +65,5 @@ pub use section::{NotMeasured, Section, SectionMeasure};
 pub use settings::{LumenSettings, PointSpread, SeedPoint};
 pub use stenosis::{Reference, ReferenceChoice, ReferenceSide, Stenosis};
 pub use surface::LumenSurface;
+pub use uncertainty::ErrorBudget;
 pub use vessel::{Leaves, Vessel};

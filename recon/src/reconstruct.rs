@@ -8,8 +8,9 @@ use thiserror::Error;
 
 use crate::centreline::Centreline;
 use crate::surface::LumenSurface;
+use crate::uncertainty::Shown;
 use crate::vessel::{self, Fitted, Vessel};
-use crate::{Contour, ImageLumen, LumenSettings, Mesh, NoLumen, ReconError, Section, Stenosis, segment};
+use crate::{Contour, ImageLumen, LumenSettings, Mesh, NoLumen, ReconError, Section, Stenosis, measures, segment};
 
 /// The lumen in 3D, with everything measured on it.
 #[derive(Clone, Debug, PartialEq)]
@@ -92,6 +93,47 @@ pub enum ReconWarning {
         /// What was missing.
         why: String,
     },
+    /// The vessel bends more sharply than it is wide.
+    #[error(
+        "from {from_mm:.1} to {to_mm:.1} mm sections normal to the vessel would cross inside it: not all are measured"
+    )]
+    Crossing {
+        /// Where it begins (mm).
+        from_mm: f64,
+        /// Where it ends (mm).
+        to_mm: f64,
+    },
+    /// The chosen reference is not there.
+    #[error("the chosen reference, {from_mm:.1} to {to_mm:.1} mm, holds no 2 mm that are measured: no stenosis is judged")]
+    NoReference {
+        /// Where it begins (mm).
+        from_mm: f64,
+        /// Where it ends (mm).
+        to_mm: f64,
+    },
+    /// The probe pressed hard.
+    #[error("from {from_mm:.1} to {to_mm:.1} mm the probe pressed with up to {most_n:.1} N: the artery may be flattened")]
+    Pressed {
+        /// Where it begins (mm).
+        from_mm: f64,
+        /// Where it ends (mm).
+        to_mm: f64,
+        /// The largest force (N).
+        most_n: f64,
+    },
+    /// The lumen is flatter where the probe pressed harder.
+    #[error(
+        "the lumen is flatter where the probe pressed harder: its smallest width falls by {percent_per_n:.1} % of the \
+         largest for each newton (forces {least_n:.1} to {most_n:.1} N)"
+    )]
+    Flattened {
+        /// How much flatter for each newton (%).
+        percent_per_n: f64,
+        /// The least force (N).
+        least_n: f64,
+        /// The largest (N).
+        most_n: f64,
+    },
     /// Many images without a lumen.
     #[error("no lumen was seen in {percent:.0} % of the images")]
     ManyWithout {
@@ -110,7 +152,7 @@ pub fn reconstruct_lumen(
     settings: &LumenSettings,
 ) -> Result<LumenReconstruction, ReconError> {
     check_sweep(images, settings)?;
-    reconstruct_from(segment_by_number(images, settings), settings)
+    reconstruct_from(images, segment_by_number(images, settings), settings)
 }
 
 /// The lumen of every image; the images are followed in the order of their numbers, whatever order they come in.
@@ -137,19 +179,22 @@ pub fn check_sweep(images: &[PlacedBScan], settings: &LumenSettings) -> Result<(
     if images.is_empty() { Err(ReconError::NoImages) } else { Ok(()) }
 }
 
-/// The same from what each image gave, whoever found it.
+/// The same from what each image gave, whoever found it. The images say where the probe was, when, and how hard it
+/// pressed; their pixels are not looked at.
 ///
 /// # Errors
 /// When too few images show a lumen.
 pub fn reconstruct_from(
+    images: &[PlacedBScan],
     mut lumens: Vec<ImageLumen>,
     settings: &LumenSettings,
 ) -> Result<LumenReconstruction, ReconError> {
     let fitted = fitted(&mut lumens)?;
     let counts = counts(&lumens);
-    let warnings = warnings(&fitted, &counts, settings);
-    let vessel = fitted.vessel(0, settings);
-    let (vessels, more) = with_branches(vessel.clone(), &lumens, settings);
+    let mut warnings = warnings(&fitted, &counts, settings);
+    let vessel = fitted.vessel(0, settings).judged(&by_time(images, &lumens, 0), settings);
+    warnings.extend(measures::warnings(&vessel.sections, settings.reference));
+    let (vessels, more) = with_branches(vessel.clone(), images, &lumens, settings);
     Ok(LumenReconstruction {
         surface: vessel.surface,
         centreline: vessel.centreline,
@@ -177,6 +222,7 @@ impl LumenReconstruction {
 /// The first vessel and its branches. A branch of too few contours is left out, and said.
 fn with_branches(
     first: Vessel,
+    images: &[PlacedBScan],
     lumens: &[ImageLumen],
     settings: &LumenSettings,
 ) -> (Vec<Vessel>, Vec<ReconWarning>) {
@@ -188,6 +234,7 @@ fn with_branches(
         match Fitted::branch(&contours, &vessels) {
             Ok((fitted, parent)) => {
                 let branch = fitted.vessel(number, settings).rooted(&vessels, parent);
+                let branch = branch.judged(&by_time(images, lumens, number), settings);
                 if branch.leaves.is_none() {
                     warnings.push(ReconWarning::NotJoined { vessel: number });
                 }
@@ -238,6 +285,17 @@ fn all(lumens: &[ImageLumen]) -> impl Iterator<Item = (usize, &Contour)> {
     lumens.iter().enumerate().flat_map(|(i, image)| {
         image.lumen.as_ref().ok().into_iter().chain(&image.others).map(move |contour| (i, contour))
     })
+}
+
+/// The images in the order they were formed, each with its contour of one vessel. `lumens` go with `images`.
+fn by_time<'a>(images: &'a [PlacedBScan], lumens: &'a [ImageLumen], vessel: usize) -> Vec<Shown<'a>> {
+    let contour = |lumen: &'a ImageLumen| {
+        lumen.lumen.as_ref().ok().into_iter().chain(&lumen.others).find(|contour| contour.vessel == vessel)
+    };
+    let mut shown: Vec<Shown<'a>> =
+        images.iter().zip(lumens).map(|(image, lumen)| Shown { image, contour: contour(lumen) }).collect();
+    shown.sort_by_key(|shown| (shown.image.bscan.formed.nanoseconds(), shown.image.bscan.number));
+    shown
 }
 
 /// The contours of one vessel, with their images' places among all, by the numbers of the images; by where they lie

@@ -1,5 +1,6 @@
 //! Sections normal to the centreline, with their areas and diameters.
 
+mod crossing;
 mod outline;
 
 use std::sync::OnceLock;
@@ -8,7 +9,7 @@ use probepath_frames::{Direction, Point, World};
 use serde::{Deserialize, Serialize};
 
 use crate::centreline::{Centreline, CentrelinePoint};
-use crate::surface::Tube;
+use crate::surface::{Tube, harmonics_of};
 use outline::Flat;
 
 /// Points of a section's outline.
@@ -102,7 +103,7 @@ pub(crate) fn area_interval(area: f64, sd: f64) -> [f64; 2] {
     [(radius - reach).max(0.0), radius + reach].map(|r| std::f64::consts::PI * r * r)
 }
 
-/// Sections every `step` (m), measured where `measured` says so.
+/// Sections every `step` (m), measured where `measured` says so and none crosses another.
 pub(crate) fn sections(
     line: &Centreline,
     tube: &Tube,
@@ -111,21 +112,39 @@ pub(crate) fn sections(
 ) -> Vec<Section> {
     let count = (line.length_m() / step).floor() as usize + 1;
     let centres = (0..count).filter_map(|i| line.at(i as f64 * step));
-    centres.map(|centre| section(tube, &centre, measured(centre.at_m))).collect()
+    let cuts: Vec<Cut> = centres.map(|centre| Cut { radii: radii(tube, centre.at_m), centre }).collect();
+    let seen: Vec<bool> = cuts.iter().map(|cut| measured(cut.centre.at_m)).collect();
+    let apart = crossing::apart(&cuts, &seen);
+    cuts.iter()
+        .zip(seen.into_iter().zip(apart))
+        .map(|(cut, (seen, apart))| {
+            let missing = match (seen, apart) {
+                (true, true) => None,
+                (true, false) => Some(NotMeasured::Crossing),
+                (false, _) => Some(NotMeasured::NotSeen),
+            };
+            section(cut, tube, missing)
+        })
+        .collect()
 }
 
-fn section(tube: &Tube, centre: &CentrelinePoint, measured: bool) -> Section {
-    let radii = radii(tube, centre.at_m);
-    let (area, (x, y)) = area_and_middle(&radii);
+/// A place of the centreline with the lumen's radii round it.
+struct Cut {
+    centre: CentrelinePoint,
+    radii: [f64; OUTLINE],
+}
+
+fn section(Cut { centre, radii }: &Cut, tube: &Tube, missing: Option<NotMeasured>) -> Section {
+    let (area, (x, y)) = area_and_middle(radii);
     let middle = centre.point.moved(centre.up, x).moved(centre.side, y);
     Section {
         at_mm: centre.at_m * 1e3,
         centre: centre.point,
         normal: centre.tangent,
-        middle: if measured { middle } else { centre.point },
+        middle: if missing.is_none() { middle } else { centre.point },
         force_n: None,
-        measure: measured.then(|| measure(&radii, area, tube.radius_sd(centre.at_m))),
-        missing: (!measured).then_some(NotMeasured::NotSeen),
+        measure: missing.is_none().then(|| measure(radii, area, tube.radius_sd(centre.at_m))),
+        missing,
     }
 }
 
@@ -163,7 +182,9 @@ fn measure(radii: &[f64; OUTLINE], area: f64, radius_sd: f64) -> SectionMeasure 
 
 /// Distances of the outline's points from the centreline.
 fn radii(tube: &Tube, at: f64) -> [f64; OUTLINE] {
-    std::array::from_fn(|k| tube.radius(at, angle(k)).max(LEAST_RADIUS_M))
+    let section = tube.section(at);
+    let radius = |turn: (f64, f64)| section.iter().zip(harmonics_of(turn)).map(|(a, b)| a * b).sum::<f64>();
+    turns().map(|turn| radius(turn).max(LEAST_RADIUS_M))
 }
 
 fn angle(k: usize) -> f64 {

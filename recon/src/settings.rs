@@ -3,7 +3,7 @@
 use probepath_us_capture::Setting;
 use serde::{Deserialize, Serialize};
 
-use crate::{ReconError, ReferenceChoice};
+use crate::{ErrorBudget, ReconError, ReferenceChoice};
 
 /// How a lumen is looked for and measured. The default is meant to need no change on leg arteries.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -29,6 +29,8 @@ pub struct LumenSettings {
     pub least_percent_area: f64,
     /// What stenoses are measured against.
     pub reference: ReferenceChoice,
+    /// What calibration, poses and contours are off by: the 95 % intervals follow from it.
+    pub errors: ErrorBudget,
 }
 
 /// A place inside a lumen, in an image.
@@ -63,6 +65,7 @@ impl Default for LumenSettings {
             longest_gap_m: 0.004,
             least_percent_area: 35.0,
             reference: ReferenceChoice::default(),
+            errors: ErrorBudget::default(),
         }
     }
 }
@@ -112,7 +115,7 @@ impl LumenSettings {
             let must = "must begin 2 mm or more before it ends";
             return Err(ReconError::Setting { name: "reference", value: to_mm - from_mm, must });
         }
-        Ok(())
+        self.errors.check()
     }
 }
 

@@ -9,7 +9,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-pub(crate) use find::find;
+pub(crate) use find::{find, has_reference};
 
 /// A narrowing of the lumen. B-mode geometry, not a Doppler grade.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

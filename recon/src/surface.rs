@@ -11,7 +11,7 @@ mod tube;
 use probepath_frames::{Point, World};
 
 pub(crate) use samples::{Samples, coarse_samples, samples};
-pub(crate) use tube::{AROUND, SectionCovariance, Shape, Tube};
+pub(crate) use tube::{AROUND, SectionCovariance, Shape, Tube, harmonics_of};
 
 use crate::centreline::{Centreline, CentrelinePoint};
 

@@ -13,6 +13,7 @@ use root::Root;
 
 pub(crate) use closed::surface as closed_surface;
 
+use crate::uncertainty::{self, AreaError, Shown};
 use crate::{Contour, LumenSettings, ReconError, ReconWarning, Section, Stenosis, section, stenosis};
 
 /// Sections are this far apart (m).
@@ -171,7 +172,8 @@ impl Fitted {
         let Self { centreline, tube, seen, .. } = self;
         let measured = |at: f64| is_measured(&seen, at, settings.longest_gap_m);
         let sections = section::sections(&centreline, &tube, SECTION_STEP_M, measured);
-        let stenoses = stenosis::find(&sections, settings.least_percent_area);
+        let errors: Vec<AreaError> = sections.iter().map(AreaError::of).collect();
+        let stenoses = stenosis::find(&sections, &errors, settings);
         let longest_gap_m = settings.longest_gap_m;
         let (leaves, root) = (None, None);
         Vessel { number, centreline, surface, sections, stenoses, leaves, tube, root, seen, longest_gap_m }
@@ -182,6 +184,15 @@ impl Vessel {
     /// Whether images show the lumen at a length (m).
     fn is_measured(&self, at: f64) -> bool {
         is_measured(&self.seen, at, self.longest_gap_m)
+    }
+
+    /// The same with what the calibration, the poses and the lag add to the sections' intervals, with the force that the
+    /// probe pressed with, and its stenoses measured with them.
+    pub(crate) fn judged(mut self, shown: &[Shown<'_>], settings: &LumenSettings) -> Self {
+        let stations = uncertainty::stations(shown, &self.centreline);
+        let errors = uncertainty::judge(&mut self.sections, &stations, &settings.errors);
+        self.stenoses = stenosis::find(&self.sections, &errors, settings);
+        self
     }
 
     /// The same as a branch of one of `vessels`; as a vessel by itself when it was not seen to leave that one.

@@ -1,7 +1,7 @@
 //! The search for stenoses along a row of sections.
 
 use super::place::{self, Place, bottom, places};
-use super::reference::{Normal, Segment, asymmetry, beside};
+use super::reference::{Normal, Segment, asymmetry, beside, stretch};
 use super::shoulder::{Shoulder, shoulders};
 use super::{ReferenceChoice, Stenosis};
 use crate::section::{TWO_SIDED_95, area_interval, diameter_of};
@@ -31,6 +31,12 @@ pub(crate) fn find(sections: &[Section], errors: &[AreaError], settings: &LumenS
     let mut found: Vec<Stenosis> = measured.filter(|s| is_one(s, settings.least_percent_area)).collect();
     found.sort_by(|a, b| a.at_mm.total_cmp(&b.at_mm));
     found
+}
+
+/// Whether a stretch holds enough measured sections to be a reference.
+pub(crate) fn has_reference(sections: &[Section], from_mm: f64, to_mm: f64) -> bool {
+    let errors: Vec<AreaError> = sections.iter().map(AreaError::of).collect();
+    stretch(&places(sections, &errors), from_mm, to_mm).is_some()
 }
 
 /// Whether what was measured is large enough, and sure.
@@ -118,7 +124,9 @@ fn stenosis(
     let [from_mm, to_mm] = narrowing.span(places);
     let absolute = least.error.total_mm2();
     let area_mm2 = area_interval(least.area, absolute);
-    let [place_sd, length_sd] = [place_sd(places, narrowing), length_sd(places, narrowing)];
+    let along = places.first().map_or(0.0, |first| least.error.apart_sd_mm(&first.error));
+    let place_sd = place_sd(places, narrowing).hypot(along);
+    let length_sd = length_sd(places, narrowing);
     let length = to_mm - from_mm;
     Stenosis {
         percent_area: 100.0 * (1.0 - ratio),

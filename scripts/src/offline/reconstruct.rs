@@ -12,6 +12,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use probepath_recon::measures::table::to_csv;
 use probepath_recon::{ImageLumen, LumenReconstruction, NoLumen, check_sweep, reconstruct_from, segment};
 use serde::Serialize;
 
@@ -174,7 +175,7 @@ fn lumen(wish: &ReconstructWish, input: &Input, timing: &mut Timing) -> Result<F
     let wrong = |source| ReconstructError::Lumen { path: wish.input.clone(), source };
     check_sweep(&input.images, &input.lumen).map_err(wrong)?;
     let (lumens, declined) = timed(&mut timing.lumen, || in_each_image(wish, input))?;
-    let recon = timed(&mut timing.surface, || reconstruct_from(lumens, &input.lumen));
+    let recon = timed(&mut timing.surface, || reconstruct_from(&input.images, lumens, &input.lumen));
     Ok((recon.map_err(wrong)?, declined))
 }
 
@@ -231,7 +232,7 @@ impl Reconstructed {
         }
         self.surface = report.surfaces.first().map(PathBuf::from);
         self.centreline = Some(table(&wish.out, "centreline.csv", &tables::centreline(recon))?);
-        self.sections = Some(table(&wish.out, "sections.csv", &tables::sections(recon))?);
+        self.sections = Some(table(&wish.out, "sections.csv", &to_csv(&recon.sections))?);
         self.stenoses.clone_from(&report.stenoses);
         self.report = Some(report);
         Ok(())

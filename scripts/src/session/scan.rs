@@ -1,7 +1,7 @@
 //! Scanning: the taught path replayed at constant force, a B-scan kept at every step along it.
 
 use probepath_frames::Stamp;
-use probepath_recon::{LumenReconstruction, LumenSettings, SeedPoint, reconstruct_lumen};
+use probepath_recon::{ErrorBudget, LumenReconstruction, LumenSettings, SeedPoint, reconstruct_lumen};
 use probepath_robot::motion::timing::PathSpeed;
 use probepath_robot::{Operator, Phase};
 use probepath_teach_replay::{
@@ -22,8 +22,9 @@ use crate::report::build::{ReportError, ScanFigures};
 pub(crate) const SCAN_FIGURES: &str = "scan.json";
 
 /// How a lumen is looked for in images that were taken with a calibration.
-pub(crate) fn lumen_settings(_calibration: Option<&Calibration>) -> LumenSettings {
-    LumenSettings::default()
+pub(crate) fn lumen_settings(calibration: Option<&Calibration>) -> LumenSettings {
+    let errors = calibration.map(ErrorBudget::of).unwrap_or_default();
+    LumenSettings { errors, ..LumenSettings::default() }
 }
 
 /// How a path is to be scanned.
