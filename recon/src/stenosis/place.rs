@@ -88,11 +88,11 @@ pub(super) fn bottom(places: &[Place], i: usize) -> Place {
     let near = within(places, i, BOTTOM_MM);
     let Some([constant, slope, bend]) = parabola(near, least.at) else { return least };
     let off = -slope / (2.0 * bend);
-    if !(bend > 0.0 && off.abs() <= BOTTOM_MM) {
+    if bend <= 0.0 || off.is_nan() || off.abs() > BOTTOM_MM {
         return least;
     }
     let area = constant + slope * off + bend * off * off;
-    if !(area > 0.0) {
+    if area.is_nan() || area <= 0.0 {
         return least;
     }
     // The errors are those of the place measured nearest: relative, so that they stay what they are.
