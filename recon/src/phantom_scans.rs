@@ -158,7 +158,7 @@ impl Sweep {
         let spacing = PixelSpacing { x_m: 1e-4 * (1.0 + columns), y_m: 1e-4 * (1.0 + rows) };
         let image = placed(i as u64, probe, probe * believed, spacing, s / speed_mm_s, self.force_n);
         let lumen = Ok(contour(&image, &outline, shear, self.speckle_mm));
-        (image, ImageLumen { number: i as u64, lumen })
+        (image, ImageLumen { number: i as u64, lumen, others: Vec::new() })
     }
 
     /// Where the image truly is: the vessel's centre in the middle of it.
@@ -258,6 +258,9 @@ fn contour(image: &PlacedBScan, outline: &[(f64, f64)], shear: f64, sd_mm: f64) 
         centre: world(centre),
         area_mm2: area * 1e6,
         sd_mm,
+        points_sd_mm: vec![sd_mm * 10.0_f64.sqrt(); pixels.len()],
+        common_sd_mm: 0.0,
+        vessel: 0,
         pixels,
         branches: false,
         wall_mm: 0.8,
