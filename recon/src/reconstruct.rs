@@ -10,7 +10,9 @@ use crate::centreline::Centreline;
 use crate::surface::LumenSurface;
 use crate::uncertainty::Shown;
 use crate::vessel::{self, Fitted, Vessel};
-use crate::{Contour, ImageLumen, LumenSettings, Mesh, NoLumen, ReconError, Section, Stenosis, measures, segment};
+use crate::{
+    Contour, ImageLumen, LumenSettings, Mesh, NoLumen, ReconError, Section, Stenosis, measures, segment,
+};
 
 /// The lumen in 3D, with everything measured on it.
 #[derive(Clone, Debug, PartialEq)]
@@ -104,7 +106,9 @@ pub enum ReconWarning {
         to_mm: f64,
     },
     /// The chosen reference is not there.
-    #[error("the chosen reference, {from_mm:.1} to {to_mm:.1} mm, holds no 2 mm that are measured: no stenosis is judged")]
+    #[error(
+        "the chosen reference, {from_mm:.1} to {to_mm:.1} mm, holds no 2 mm that are measured: no stenosis is judged"
+    )]
     NoReference {
         /// Where it begins (mm).
         from_mm: f64,
@@ -112,7 +116,9 @@ pub enum ReconWarning {
         to_mm: f64,
     },
     /// The probe pressed hard.
-    #[error("from {from_mm:.1} to {to_mm:.1} mm the probe pressed with up to {most_n:.1} N: the artery may be flattened")]
+    #[error(
+        "from {from_mm:.1} to {to_mm:.1} mm the probe pressed with up to {most_n:.1} N: the artery may be flattened"
+    )]
     Pressed {
         /// Where it begins (mm).
         from_mm: f64,
@@ -180,7 +186,7 @@ pub fn check_sweep(images: &[PlacedBScan], settings: &LumenSettings) -> Result<(
 }
 
 /// The same from what each image gave, whoever found it. The images say where the probe was, when, and how hard it
-/// pressed; their pixels are not looked at.
+/// pressed; their pixels are not looked at. Without images (an empty slice) the intervals are those of the contours alone.
 ///
 /// # Errors
 /// When too few images show a lumen.

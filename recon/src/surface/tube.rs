@@ -135,11 +135,6 @@ impl Tube {
         self.covariance(at)[(0, 0)].max(0.0).sqrt()
     }
 
-    /// Distance from the centreline at a length and an angle (m).
-    pub(crate) fn radius(&self, at: f64, angle: f64) -> f64 {
-        self.shape.radius(at, (angle.cos(), angle.sin()))
-    }
-
     /// Area of the section at a length and its standard deviation (m2).
     pub(crate) fn area(&self, at: f64) -> (f64, f64) {
         let mut slope = SVector::from(self.section(at)) * std::f64::consts::PI;

@@ -70,9 +70,9 @@ fn the_order_of_the_images_changes_nothing() {
         let noisy = cuts.iter().map(|cut| vessel.contour(*cut, 32, |_| 0.1e-3 * dice.normal_pair().0));
         let lumens: Vec<ImageLumen> = numbered(noisy.collect::<Vec<_>>());
         let settings = LumenSettings::default();
-        let once = reconstruct_from(lumens.clone(), &settings).expect("a vessel");
+        let once = reconstruct_from(&[], lumens.clone(), &settings).expect("a vessel");
         let mixed = shuffled(lumens.len(), &mut dice).into_iter().map(|i| lumens[i].clone()).collect();
-        let again = reconstruct_from(mixed, &settings).expect("a vessel");
+        let again = reconstruct_from(&[], mixed, &settings).expect("a vessel");
         assert_eq!(once.vessels, again.vessels);
         assert_eq!(once.warnings, again.warnings);
     }
@@ -130,7 +130,7 @@ fn contours_whose_pose_jumped_do_not_bend_the_vessel() {
     cuts[31].off = Vector3::new(0.0, 0.02, 0.01);
     cuts[60].off = Vector3::new(1.5e-3, 0.0, 1.0e-3);
     let lumens = numbered(exact(&vessel, &cuts));
-    let found = reconstruct_from(lumens, &LumenSettings::default()).expect("a vessel");
+    let found = reconstruct_from(&[], lumens, &LumenSettings::default()).expect("a vessel");
     assert_eq!(found.counts.without_lumen, 2, "{:?}", found.counts);
     let off = off_axis(&found.centreline, &vessel);
     assert!(off.iter().copied().fold(0.0, f64::max) < 0.2e-3);

@@ -53,7 +53,7 @@ fn both(first: Vec<Contour>, branch: Vec<Contour>) -> Vec<ImageLumen> {
 }
 
 fn made(lumens: Vec<ImageLumen>) -> LumenReconstruction {
-    reconstruct_from(lumens, &LumenSettings::default()).expect("vessels")
+    reconstruct_from(&[], lumens, &LumenSettings::default()).expect("vessels")
 }
 
 #[test]
