@@ -39,6 +39,6 @@ pub(super) fn sections(vessels: &[Vessel], recon: &LumenReconstruction) -> Vec<S
 }
 
 fn holds(measure: &SectionMeasure, true_mm2: f64) -> bool {
-    let half = 1.96 * measure.area_sd_mm2;
-    (measure.area_mm2 - half..=measure.area_mm2 + half).contains(&true_mm2)
+    let [low, high] = measure.area_interval_mm2;
+    (low..=high).contains(&true_mm2)
 }
