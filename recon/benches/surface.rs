@@ -68,7 +68,7 @@ fn write_for_peers() {
     let Some(folder) = std::env::var_os("PROBEPATH_BENCH_FILES").map(PathBuf::from) else { return };
     std::fs::create_dir_all(&folder).expect("a folder");
     let (_, lumens) = sweep(300);
-    let found = reconstruct_from(lumens, &LumenSettings::default()).expect("a vessel");
+    let found = reconstruct_from(&[], lumens, &LumenSettings::default()).expect("a vessel");
     found.closed_surface().write(&folder.join("lumen.ply")).expect("written");
     let planes = found.sections.iter().filter_map(|section| {
         let (c, n) = (section.centre.vector() * 1e3, section.normal.vector());
@@ -86,7 +86,7 @@ fn surface(criterion: &mut Criterion) {
     for count in [300, 500, 1000, 2000, 4000] {
         let (_, lumens) = sweep(count);
         let made = |lumens: Vec<ImageLumen>| {
-            let found = reconstruct_from(lumens, &settings).expect("a vessel");
+            let found = reconstruct_from(&[], lumens, &settings).expect("a vessel");
             (found.closed_surface(), found)
         };
         group.bench_with_input(BenchmarkId::from_parameter(count), &lumens, |bencher, lumens| {

@@ -41,7 +41,7 @@ fn the_last_view_of_contours_is_what_they_give_together() {
     let lumens = contours(0.6e-3);
     let live = live_with(lumens.clone());
     let view = live.view().vessel.expect("a vessel");
-    let whole = reconstruct_from(lumens, &LumenSettings::default()).expect("a vessel");
+    let whole = reconstruct_from(&[], lumens, &LumenSettings::default()).expect("a vessel");
     assert_eq!(view.surface, whole.surface);
     assert_eq!(view.centreline, whole.centreline);
     assert!((view.covered_percent - 100.0).abs() < 1.0 && view.sparse_mm.is_empty(), "{view:?}");
@@ -55,7 +55,7 @@ fn a_view_of_many_images_takes_part_of_them_and_shows_the_same_vessel() {
     let live = live_with(contours(0.05e-3));
     assert!(live.viewed.len() < 500 && live.lumens.len() == 1201, "{}", live.viewed.len());
     let view = live.view().vessel.expect("a vessel");
-    let whole = reconstruct_from(live.into_lumens(), &LumenSettings::default()).expect("a vessel");
+    let whole = reconstruct_from(&[], live.into_lumens(), &LumenSettings::default()).expect("a vessel");
     let apart = compare(&view.surface.mesh(), &whole.surface.mesh(), Fit::None).expect("surfaces");
     assert!(apart.hausdorff_mm < 0.05, "{}", apart.hausdorff_mm);
 }

@@ -176,7 +176,7 @@ fn poses_that_jump_to_another_place_leave_a_stretch_that_is_not_measured() {
     let across = (vessel.axis(0.041) - vessel.axis(0.039)).normalize().cross(&Vector3::x()).normalize();
     cuts.iter_mut().skip(50).for_each(|cut| cut.off = across * 0.012);
     let found =
-        reconstruct_from(numbered(exact(&vessel, &cuts)), &LumenSettings::default()).expect("a vessel");
+        reconstruct_from(&[], numbered(exact(&vessel, &cuts)), &LumenSettings::default()).expect("a vessel");
     assert!(
         found.warnings.iter().any(|warning| matches!(warning, ReconWarning::Gap { .. })),
         "{:?}",
@@ -190,7 +190,7 @@ fn poses_that_jump_to_another_place_leave_a_stretch_that_is_not_measured() {
 fn what_makes_no_vessel_is_an_error_that_says_why() {
     let vessel = BentVessel::new(0.08, 3.5e-3, 0.2, &mut Dice(10));
     let settings = LumenSettings::default();
-    let make = |cuts: &[Cut]| reconstruct_from(numbered(exact(&vessel, cuts)), &settings);
+    let make = |cuts: &[Cut]| reconstruct_from(&[], numbered(exact(&vessel, cuts)), &settings);
     assert!(matches!(make(&[straight(0.01)]), Err(ReconError::TooFew { seen: 1, images: 1, .. })));
     let same = vec![straight(0.01); 30];
     assert!(matches!(make(&same), Err(ReconError::NoLength { .. })));
@@ -203,5 +203,5 @@ fn what_makes_no_vessel_is_an_error_that_says_why() {
         let Ok(contour) = &mut image.lumen else { continue };
         contour.centre = probepath_frames::Point::new(f64::NAN, 0.0, 0.0);
     }
-    assert!(reconstruct_from(lost, &settings).is_err());
+    assert!(reconstruct_from(&[], lost, &settings).is_err());
 }
