@@ -10,7 +10,8 @@
 //! and σ as near to 1 as can be, where each joint stays in its [`Room`](crate::Room) (range, speed, acceleration and
 //! jerk, now and for ever after), the probe can still brake before every plane of the workspace, and the arm before a
 //! singularity. What a seventh joint leaves free pulls the joints away from their limits and the arm from
-//! singularities. A second look with the Jacobian at the end takes away what the first order leaves (1e-9 m), so
+//! singularities. A singularity is looked at from as far away as braking takes: from a fixed distance it was too late for
+//! fast joints, which then left the way by up to 39 mm. A second look with the Jacobian at the end takes away what the first order leaves (1e-9 m), so
 //! nothing adds up.
 //!
 //! Where not even σ = 0 is possible the probe leaves its way, by as little as the limits allow, and is led back
@@ -40,8 +41,10 @@ use singular::Weakest;
 
 /// Joints that a probe needs to go anywhere.
 const LEAST_JOINTS: usize = 6;
-/// Below this many times the least singular value its gradient is looked at.
+/// Below this many times the least singular value its gradient is looked at, and wherever it falls so that it would
+/// come there within this many times the way of a brake.
 const NEAR_SINGULAR: f64 = 3.0;
+const NEAR_BRAKE: f64 = 2.0;
 /// Off its way by less than this (m, rad) the probe is put back in a tick; by more, as by three equal poles (rad/s),
 /// the quicker the less it is.
 const TINY: f64 = 1e-8;
@@ -153,6 +156,8 @@ struct Look {
     /// The joints' last step (rad, m).
     last: Joints,
     dt: f64,
+    /// Whether the probe is led, and has no way to leave.
+    slides: bool,
     /// The joints' speeds (rad/s, m/s).
     speeds: Joints,
     /// The least and the largest step of each joint (rad, m).
@@ -301,7 +306,7 @@ impl Stepper {
         let speeds = self.limiter.limits().velocity;
         let planes = self.planes(&reach, &last, &together);
         let singular = self.singular(&reach, &there, &together);
-        Look { ends: self.ends(&here, &together), reach, last, dt: self.dt, speeds, planes, singular }
+        Look { ends: self.ends(&here, &together), reach, last, slides, dt: self.dt, speeds, planes, singular }
     }
 
     /// The least and largest steps: each joint's room, and less of it where a joint could not stay on the way while
@@ -356,7 +361,8 @@ impl Stepper {
 
     fn singular(&self, reach: &Reach, there: &Joints, together: &Together) -> Option<(Joints, f64)> {
         let room = self.weakest.value() - self.settings.least_singular;
-        if room > (NEAR_SINGULAR - 1.0) * self.settings.least_singular {
+        let brakes_over = NEAR_BRAKE * self.weakest.fell() * together.ticks();
+        if room > brakes_over.max((NEAR_SINGULAR - 1.0) * self.settings.least_singular) {
             return None;
         }
         let at = |joints: &Joints| self.model.reach(joints, &self.flange_from_probe).jacobian;
@@ -431,7 +437,10 @@ impl Stepper {
 
     fn unsafe_after(&self, look: &Look, after: &Limiter) -> Option<Binding> {
         let near = look.planes.iter().any(Option::is_some);
-        let singular = look.singular.is_some() && self.weakest.value() < 1.5 * self.settings.least_singular;
+        // On its way it stays there: the joints' limits hold, and what it could leave its way for is behind it soon.
+        let singular = look.slides
+            && look.singular.is_some()
+            && self.weakest.value() < 1.5 * self.settings.least_singular;
         if !near && !singular {
             return None;
         }

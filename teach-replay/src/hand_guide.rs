@@ -2,7 +2,8 @@
 
 mod give_way;
 
-use probepath_robot::{Command, Controller, Joints, Limiter, LimitsError, State};
+use probepath_robot::step::{Binding, StepError, StepSettings, Stepper};
+use probepath_robot::{Command, Controller, Joints, State, Workspace};
 use thiserror::Error;
 
 use crate::ProbeArm;
@@ -21,9 +22,9 @@ pub enum GuideError {
         /// Its value.
         value: f64,
     },
-    /// The arm's limits cannot be kept.
+    /// The arm's limits cannot be kept, or a step cannot be made with it.
     #[error("{0}")]
-    Limits(#[from] LimitsError),
+    Step(#[from] StepError),
     /// The start has a number that is not finite, or a wrong number of joints.
     #[error("hand guiding cannot start from {found} joints, the arm has {joints}, all finite")]
     Start {
@@ -52,14 +53,15 @@ enum Stage {
 /// ```
 ///
 /// The wrench, less a dead band, becomes a velocity of the probe through a mass and a damper in every direction of
-/// the probe (admittance); it is bounded, turned into joint velocities by damped least squares, slowed down toward
-/// singularities, and kept within every joint's position, velocity, acceleration and jerk by the same limiter that has
-/// the last word in the loop.
+/// the probe (admittance); it is bounded, and the [`Stepper`] turns it into joint steps: as nearly the velocity as the
+/// joints' limits, the workspace's planes and the distance to singularities allow, so that the probe slides along what
+/// it must not cross.
 #[derive(Clone, Debug)]
 pub struct HandGuide {
     arm: ProbeArm,
     settings: GiveWay,
-    limiter: Limiter,
+    stepper: Stepper,
+    held_by: Option<Binding>,
     motion: Motion,
     stage: Stage,
     dt: f64,
@@ -75,11 +77,25 @@ impl HandGuide {
         if start.len() != arm.model.joints() || !start.is_finite() {
             return Err(GuideError::Start { found: start.len(), joints: arm.model.joints() });
         }
-        let limiter = Limiter::at_rest(arm.limits.scaled(give_way::SHARE), arm.period, *start)?;
+        let stepper = stepper(&arm, &settings, *start, Workspace::new())?;
         let dt = arm.period.seconds();
         let stage = Stage::Waiting { ticks: 0 };
         let motion = Motion::at_rest(dt);
-        Ok(Self { arm, settings, limiter, motion, stage, dt })
+        Ok(Self { arm, settings, stepper, held_by: None, motion, stage, dt })
+    }
+
+    /// The same, before it begins, the probe led nowhere outside of `workspace`.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn within(mut self, workspace: Workspace) -> Result<Self, GuideError> {
+        self.stepper = stepper(&self.arm, &self.settings, *self.stepper.limiter().position(), workspace)?;
+        Ok(self)
+    }
+
+    /// The limit that the hand pushes against now.
+    pub const fn held_by(&self) -> Option<Binding> {
+        self.held_by
     }
 
     /// Whether the hand leads now.
@@ -93,27 +109,41 @@ impl HandGuide {
             return None;
         }
         self.stage = Stage::Waiting { ticks: ticks + 1 };
-        Some(*self.limiter.position())
+        Some(*self.stepper.limiter().position())
     }
 
     fn guide(&mut self, state: &State) -> Option<Joints> {
         self.motion.feel(&self.settings, &state.wrench);
-        let here = *self.limiter.position();
-        let velocity = self.motion.joint_velocity(&self.arm, &self.settings, &here);
-        let wanted = here.zip(&velocity, |q, v| q + v * self.dt);
-        // Not finite: the limiter refuses it; the arm comes to rest where it is.
-        match self.limiter.limit(&wanted) {
-            Ok(limited) => Some(limited.position),
-            Err(_) => Some(self.limiter.brake()),
+        let base_from_probe = self.arm.probe(self.stepper.limiter().position());
+        let (twist, freedom) = self.motion.twist(&self.settings, &base_from_probe);
+        // Not finite: the step refuses it; the arm comes to rest where it is.
+        match self.stepper.lead(&twist, freedom) {
+            Ok(stepped) => {
+                self.held_by = stepped.binding;
+                Some(stepped.position)
+            }
+            Err(_) => Some(self.stepper.brake()),
         }
     }
 
     fn brake(&mut self) -> Option<Joints> {
-        if self.limiter.is_at_rest() {
+        if self.stepper.limiter().is_at_rest() {
             return None;
         }
-        Some(self.limiter.brake())
+        Some(self.stepper.brake())
     }
+}
+
+/// Steps the arm from rest at `start`, within a part of its limits.
+fn stepper(
+    arm: &ProbeArm,
+    settings: &GiveWay,
+    start: Joints,
+    workspace: Workspace,
+) -> Result<Stepper, StepError> {
+    let step = StepSettings { workspace, least_singular: settings.least_singular, ..StepSettings::default() };
+    let limits = arm.limits.scaled(give_way::SHARE);
+    Stepper::at_rest(arm.model.clone(), arm.flange_from_probe, limits, arm.period, start, step)
 }
 
 impl Controller for HandGuide {

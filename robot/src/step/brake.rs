@@ -37,6 +37,12 @@ impl Together {
         Self { step, change, acceleration, jerk, ratio, slides }
     }
 
+    /// No fewer ticks than all joints need to come to rest together.
+    pub(super) fn ticks(&self) -> f64 {
+        let (acceleration, jerk) = self.ratio;
+        1.0 / acceleration + acceleration / jerk
+    }
+
     /// The least value of `row · step` from which `distance + row · (way to rest)` is not below zero; never more than
     /// the brake itself reaches. `None` where the distance is out of question.
     pub(super) fn least(&self, row: &Joints, distance: f64) -> Option<f64> {

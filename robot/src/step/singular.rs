@@ -18,14 +18,18 @@ const DAMPING: f64 = 1e-12;
 pub(super) struct Weakest {
     direction: Vector6,
     value: f64,
+    /// How much it fell in the last tick.
+    fell: f64,
 }
 
 impl Weakest {
     pub(super) fn of(jacobian: &Jacobian) -> Self {
-        let mut weakest = Self { direction: Vector6::from([0.7, 0.3, -0.5, 0.4, -0.6, 0.5]), value: 0.0 };
+        let mut weakest =
+            Self { direction: Vector6::from([0.7, 0.3, -0.5, 0.4, -0.6, 0.5]), value: 0.0, fell: 0.0 };
         for _ in 0..FIRST {
             weakest.follow(jacobian);
         }
+        weakest.fell = 0.0;
         weakest
     }
 
@@ -38,13 +42,19 @@ impl Weakest {
         let length = next.norm();
         if length.is_finite() && length > 0.0 {
             self.direction = next / length;
-            self.value = (j.transpose() * self.direction).norm();
+            let value = (j.transpose() * self.direction).norm();
+            (self.fell, self.value) = (self.value - value, value);
         }
     }
 
     /// The smallest singular value.
     pub(super) const fn value(&self) -> f64 {
         self.value
+    }
+
+    /// How much it fell in the last tick; below zero where it grew.
+    pub(super) const fn fell(&self) -> f64 {
+        self.fell
     }
 
     /// How it grows with each joint: `uᵀ (∂J/∂q) v` with the singular vectors held, by differences.

@@ -321,11 +321,11 @@ fn a_joint_that_comes_to_the_end_of_its_range_stops_the_probe_on_its_way() {
 }
 
 #[test]
-fn near_a_singularity_it_slows_down_instead_of_exploding() {
+fn near_a_singularity_it_slows_down_along_its_way_and_says_so() {
     let model = Model::ur5e();
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let (mut least, mut slow, mut off) = (f64::INFINITY, 0, Vec::new());
-    for case in 0..60 {
+    for case in 0..120 {
         // Wrist 2 near zero: its neighbours' axes nearly meet. The way turns the probe across.
         let mut start = bent(&model);
         start[4] = between(&mut rng, 0.15, 0.4);
@@ -339,17 +339,20 @@ fn near_a_singularity_it_slows_down_instead_of_exploding() {
             let value = model.jacobian(row, &tool()).smallest_singular_value();
             least = least.min(value);
         }
-        slow += usize::from(walk.seen.iter().any(|stepped| stepped.part < 0.9));
-        off.push(walk.off);
-        assert!(walk.off < 0.1, "case {case}: {} m off", walk.off);
+        let held = walk.seen.iter().filter(|stepped| stepped.part < 0.9);
+        slow += usize::from(held.clone().next().is_some());
+        assert!(held.clone().all(|stepped| stepped.binding.is_some()), "case {case}: nothing was named");
+        off.push((walk.off, case));
     }
-    off.sort_by(f64::total_cmp);
+    off.sort_by(|a, b| a.0.total_cmp(&b.0));
     eprintln!(
-        "singular value {least:e}; {slow} of 60 slowed down; off the way {:e} (median), {:e} (most)",
-        off[30], off[59]
+        "singular value {least:e}; {slow} of 120 slowed down; off the way {:e} m (median), at most {:?}",
+        off[60].0,
+        &off[110..]
     );
-    assert!(least > 1e-4 && off[30] < 1e-6, "{least} {}", off[30]);
-    assert!(slow > 5, "{slow}");
+    assert!(slow > 15 && least > 1e-3, "{slow} {least}");
+    // Nobody looked ahead here, as a plan's timing does: two of these ways turn into the singularity too sharply.
+    assert!(off[60].0 < 1e-9 && off[117].0 < 1e-4 && off[119].0 < 1e-3, "{:?}", &off[117..]);
 }
 
 #[test]

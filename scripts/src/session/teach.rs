@@ -114,7 +114,10 @@ impl Session {
         let stand = || by.stand();
         let start = self.ask_where(STEP, by.stand().phase)?.commanded;
         let mut controller: Box<dyn Controller + Send> = match by {
-            GuideBy::Compliance => Box::new(HandGuide::new(arm, &start, GiveWay::default())?),
+            GuideBy::Compliance => {
+                let guide = HandGuide::new(arm, &start, GiveWay::default())?;
+                Box::new(guide.within(self.cell.workspace())?)
+            }
             GuideBy::Freedrive => Box::new(Freedrive::new(arm.period.seconds())),
         };
         let exam = self.exam.as_ref().ok_or(SessionError::Order("the exam was not begun"))?;

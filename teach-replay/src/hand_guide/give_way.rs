@@ -1,21 +1,15 @@
-//! From the wrench to joint velocities: mass, damper, bounds, and the way round singularities.
+//! From the wrench to the probe's twist: mass, damper, bounds.
 
-use nalgebra::{Matrix6, Vector3, Vector6};
-use probepath_frames::{Probe, Wrench};
-use probepath_robot::Joints;
+use nalgebra::{Vector3, Vector6};
+use probepath_frames::{Base, Pose, Probe, Wrench};
 use probepath_robot::motion::timing::SpeedRamp;
 
 use super::GuideError;
-use crate::ProbeArm;
 
 /// Part of the joints' limits that hand guiding uses; the loop's own limiter then never has to correct it.
 pub(super) const SHARE: f64 = 0.95;
-/// Damping of the least squares at a singularity (m, rad).
-const DAMPING: f64 = 0.05;
-/// Ticks between two looks at the distance to a singularity.
-const LOOK_TICKS: u8 = 7;
-/// How far ahead it is looked whether a singularity comes nearer (s).
-const AHEAD_S: f64 = 0.05;
+/// A redundant arm uses all of its freedom from this speed of the probe (m/s, rad/s) on.
+const FREE_FROM: (f64, f64) = (0.01, 0.05);
 
 /// How the arm gives way. Directions are the probe's x, y, z.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,10 +30,9 @@ pub struct GiveWay {
     pub speed_m_s: f64,
     /// Largest speed of turning (rad/s).
     pub turn_rad_s: f64,
-    /// Below this smallest singular value of the probe's Jacobian motions toward the singularity slow down ...
-    pub slow_below: f64,
-    /// ... to nothing at this one.
-    pub stop_below: f64,
+    /// The smallest singular value of the probe's Jacobian that the arm is led to; from six times it on the joints slow
+    /// down.
+    pub least_singular: f64,
     /// How long nobody may hold the switch before it ends (s).
     pub wait_s: f64,
 }
@@ -55,8 +48,7 @@ impl Default for GiveWay {
             dead_n_m: 0.03,
             speed_m_s: 0.085,
             turn_rad_s: 0.5,
-            slow_below: 0.06,
-            stop_below: 0.02,
+            least_singular: 0.012,
             wait_s: 60.0,
         }
     }
@@ -76,9 +68,7 @@ impl GiveWay {
             ("dead_n_m", self.dead_n_m),
             ("speed_m_s", self.speed_m_s),
             ("turn_rad_s", self.turn_rad_s),
-            ("slow_below", self.slow_below),
-            ("slow_below - stop_below", self.slow_below - self.stop_below),
-            ("stop_below", self.stop_below),
+            ("least_singular", self.least_singular),
             ("wait_s", self.wait_s),
         ];
         match each.chain(single).find(|(_, value)| !(value.is_finite() && *value > 0.0)) {
@@ -97,8 +87,6 @@ pub(super) struct Motion {
     /// lead the probe astray.
     speeds: [SpeedRamp; 6],
     moving: [f64; 6],
-    /// Distance to the nearest singularity, and ticks until it is looked at again.
-    nearness: (f64, u8),
     dt: f64,
 }
 
@@ -111,14 +99,7 @@ impl Motion {
         let (linear, angular) =
             (SpeedRamp::at_rest(LINEAR.0, LINEAR.1), SpeedRamp::at_rest(ANGULAR.0, ANGULAR.1));
         let speeds = [linear, linear, linear, angular, angular, angular];
-        Self {
-            linear: Vector3::zeros(),
-            angular: Vector3::zeros(),
-            speeds,
-            moving: [0.0; 6],
-            nearness: (0.0, 0),
-            dt,
-        }
+        Self { linear: Vector3::zeros(), angular: Vector3::zeros(), speeds, moving: [0.0; 6], dt }
     }
 
     /// One tick of `mass * acceleration = force - damping * velocity`, solved for the tick's end, so that it is
@@ -144,37 +125,21 @@ impl Motion {
         }
     }
 
-    /// Distance to the nearest singularity: a singular value is dear, and changes little in [`LOOK_TICKS`].
-    fn nearness(&mut self, arm: &ProbeArm, here: &Joints) -> f64 {
-        self.nearness = match self.nearness {
-            (_, 0) => (arm.distance_to_singularity(here), LOOK_TICKS),
-            (known, ticks) => (known, ticks - 1),
-        };
-        self.nearness.0
-    }
-
-    /// The joint velocities that move the probe so from `here`, or a part of them.
-    pub(super) fn joint_velocity(&mut self, arm: &ProbeArm, settings: &GiveWay, here: &Joints) -> Joints {
-        let rotation = arm.probe(here).isometry().rotation;
+    /// How the probe should move now: its twist in the base's axes (m/s, rad/s), and how much of its freedom a
+    /// redundant arm may use meanwhile: none while the probe is to rest.
+    pub(super) fn twist(
+        &self,
+        settings: &GiveWay,
+        base_from_probe: &Pose<Base, Probe>,
+    ) -> (Vector6<f64>, f64) {
         let moving = &self.moving;
         // Each direction keeps its bound by itself; together they keep it here.
         let linear = Vector3::new(moving[0], moving[1], moving[2]).cap_magnitude(settings.speed_m_s);
         let angular = Vector3::new(moving[3], moving[4], moving[5]).cap_magnitude(settings.turn_rad_s);
+        let freedom = (linear.norm() / FREE_FROM.0).max(angular.norm() / FREE_FROM.1).min(1.0);
+        let rotation = base_from_probe.isometry().rotation;
         let (linear, angular) = (rotation * linear, rotation * angular);
-        let twist = Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z);
-        let jacobian = arm.model.jacobian(here, &arm.flange_from_probe);
-        let nearness = self.nearness(arm, here);
-        let damping = DAMPING * (1.0 - nearness / settings.slow_below).clamp(0.0, 1.0);
-        let matrix = jacobian.matrix();
-        let square = matrix * matrix.transpose() + Matrix6::identity() * (damping * damping + 1e-12);
-        let Some(inverse) = square.try_inverse() else { return Joints::zeros(here.len()) };
-        let solved = matrix.transpose() * (inverse * twist);
-        let mut velocity = Joints::zeros(here.len());
-        for (v, solved) in velocity.as_mut_slice().iter_mut().zip(solved.iter()) {
-            *v = *solved;
-        }
-        let part = slowed(arm, settings, here, &velocity, nearness) * within(arm, &velocity);
-        velocity.map(|v| v * part)
+        (Vector6::new(linear.x, linear.y, linear.z, angular.x, angular.y, angular.z), freedom)
     }
 }
 
@@ -182,20 +147,4 @@ impl Motion {
 fn beyond(vector: Vector3<f64>, dead: f64) -> Vector3<f64> {
     let length = vector.norm();
     if length <= dead { Vector3::zeros() } else { vector * (1.0 - dead / length) }
-}
-
-/// Part of the speed that is left: all of it away from singularities and on the way out of them.
-fn slowed(arm: &ProbeArm, settings: &GiveWay, here: &Joints, velocity: &Joints, nearness: f64) -> f64 {
-    let GiveWay { slow_below, stop_below, .. } = *settings;
-    if nearness >= slow_below {
-        return 1.0;
-    }
-    let there = arm.distance_to_singularity(&here.zip(velocity, |q, v| q + v * AHEAD_S));
-    if there > nearness { 1.0 } else { ((nearness - stop_below) / (slow_below - stop_below)).clamp(0.0, 1.0) }
-}
-
-/// Part of the speed that every joint can go, so that the direction is kept.
-fn within(arm: &ProbeArm, velocity: &Joints) -> f64 {
-    let parts = velocity.zip(&arm.limits.velocity, |v, most| SHARE * most / v.abs().max(1e-9));
-    parts.iter().fold(1.0, f64::min)
 }

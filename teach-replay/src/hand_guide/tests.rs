@@ -1,9 +1,9 @@
 //! A hand on the small plant.
 
 use nalgebra::Vector3;
-use probepath_frames::{Span, Wrench};
+use probepath_frames::{Direction, Point, Span, Wrench};
 use probepath_robot::{
-    Arm, ArmFault, Command, Controller, Ending, Guard, GuardLimits, Joints, State, Tick, Wish, run,
+    Arm, ArmFault, Command, Controller, Ending, Guard, GuardLimits, Joints, Plane, State, Tick, Wish, run,
 };
 
 use super::*;
@@ -113,6 +113,29 @@ fn pulled_to_the_end_of_its_reach_it_slows_down_and_comes_back() {
     let back = arm().probe(&commanded[commanded.len() - 1]).origin().vector().x;
     let furthest = commanded.iter().map(|q| arm().probe(q).origin().vector().x).fold(0.0, f64::max);
     assert!(back < furthest - 0.1, "{back} {furthest}");
+}
+
+#[test]
+fn pushed_against_a_plane_of_the_workspace_it_slides_along_it_and_the_plane_is_named() {
+    let start = home();
+    let from = arm().probe(&start).origin().vector();
+    let table = Plane { through: Point::new(from.x, from.y, from.z - 0.02), inward: Direction::z() };
+    let guide = HandGuide::new(arm(), &start, GiveWay::default()).unwrap();
+    let mut guide = guide.within(Workspace::new().and(table)).unwrap();
+    let push: Push = Box::new(|t, _| (Vector3::new(0.0, 3.3, -15.0), Vector3::zeros(), t < 3.0));
+    let mut held = Held { plant: Plant::new(NOWHERE, start, 1), push };
+    let mut state = held.exchange(&Command::Stay).unwrap();
+    let (mut commanded, mut names) = (vec![start; 3], Vec::new());
+    while let Some(Command::Position(joints)) = guide.step(&state) {
+        commanded.push(joints);
+        names.extend(guide.held_by());
+        assert!(arm().probe(&joints).origin().vector().z >= from.z - 0.02, "beyond the plane");
+        state = held.exchange(&Command::Position(joints)).unwrap();
+    }
+    keeps_limits(&commanded);
+    let way = arm().probe(&commanded[commanded.len() - 1]).origin().vector() - from;
+    assert!(way.z < -0.018 && way.y > 0.08 && way.x.abs() < 0.005, "{way}");
+    assert!(names.contains(&Binding::Plane { number: 0 }), "{names:?}");
 }
 
 #[test]
