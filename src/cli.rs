@@ -77,6 +77,9 @@ pub struct Reconstruct {
     /// Build the volume too.
     #[arg(long)]
     pub volume: bool,
+    /// A place in the lumen of the first image: right of its first column and below its first row (mm). Found otherwise.
+    #[arg(long, value_name = "X,Y", value_delimiter = ',', num_args = 2)]
+    pub seed_mm: Option<Vec<f64>>,
     /// A program that finds the lumen in the place of probepath's own finder (a .py is run with Python): it gets images
     /// and answers contours. docs/reconstruction.md says how.
     #[arg(long, value_name = "PROGRAM")]
@@ -182,7 +185,7 @@ pub struct Validate {
     /// How long the soak is.
     #[arg(long, default_value_t = 10.0)]
     pub minutes: f64,
-    /// Only this setting of the table ("zoom 3:7").
+    /// Only this setting of the table ("zoom 3:7"), or this number of images of speed.
     #[arg(long, value_name = "NAME")]
     pub setting: Option<String>,
     /// How many seeds of table2 at a time.
@@ -200,6 +203,8 @@ pub enum Goal {
     Table1,
     /// Table II of the paper: the error of the reconstructed phantom, setting by setting.
     Table2,
+    /// From an exam file to the report: time by stage and memory, for 500 to 4,000 images.
+    Speed,
     /// The contact force along the leg.
     Force,
     /// Minutes of replay on the wire beside image capture and recording: what was lost, how punctual it was.

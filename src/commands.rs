@@ -42,9 +42,13 @@ fn arm(args: crate::cli::Arm) -> Outcome {
 }
 
 fn reconstruct(args: crate::cli::Reconstruct, screen: &Screen) -> Outcome {
-    let crate::cli::Reconstruct { input, calibration, volume, lumen, lumen_seconds, out } = args;
+    let crate::cli::Reconstruct { input, calibration, volume, seed_mm, lumen, lumen_seconds, out } = args;
+    let seed_mm = match seed_mm.as_deref() {
+        Some(&[x_mm, y_mm]) => Some((x_mm, y_mm)),
+        _ => None,
+    };
     let lumen = lumen.map(|program| offline::FinderWish { program, seconds: lumen_seconds });
-    let wish = offline::ReconstructWish { input, calibration, volume, lumen, out };
+    let wish = offline::ReconstructWish { input, calibration, volume, seed_mm, lumen, out };
     Ok(Document::of(&offline::reconstruct(&wish, &*screen.progress())?)?)
 }
 
@@ -73,6 +77,9 @@ fn validated(args: &crate::cli::Validate, screen: &Screen) -> Outcome {
     Ok(match args.goal {
         Goal::Table1 => Document::of(&validate::table1(seeds, args.setting.as_deref(), &*progress)?),
         Goal::Table2 => Document::of(&validate::table2(&table2_wish(args), &*progress)?),
+        Goal::Speed => {
+            Document::of(&validate::speed(args.setting.as_deref(), &std::env::current_exe()?, &*progress)?)
+        }
         Goal::Force => Document::of(&validate::force(seeds, &*progress)?),
         Goal::Soak => Document::of(&validate::soak(&validate::SoakWish::wall(args.minutes), &*progress)?),
         Goal::Motion => Document::of(&validate::motion(seeds, &*progress)?),

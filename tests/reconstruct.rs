@@ -6,7 +6,12 @@
     clippy::panic,
     reason = "a test stops at the first surprise"
 )]
+#![allow(clippy::print_stderr, reason = "a test that is skipped says so")]
 
+#[path = "reconstruct/bad.rs"]
+mod bad;
+#[path = "reconstruct/finder.rs"]
+mod finder;
 #[path = "common/sweep.rs"]
 mod sweep;
 

@@ -7,6 +7,7 @@ mod force;
 mod motion;
 mod safety;
 mod soak;
+mod speed;
 mod table1;
 mod table2;
 
@@ -19,6 +20,7 @@ pub use force::force;
 pub use motion::{Shares, motion, shares};
 pub use safety::safety;
 pub use soak::{SoakWish, soak};
+pub use speed::speed;
 pub use table1::table1;
 pub use table2::{Table2Wish, table2};
 
@@ -88,6 +90,20 @@ pub enum ValidateError {
     #[error("cannot serve the simulated cell: {why}")]
     Served {
         /// Why.
+        why: String,
+    },
+    /// The B-scans cannot be drawn.
+    #[error("the B-scans cannot be drawn: {why}")]
+    Drawing {
+        /// Why.
+        why: String,
+    },
+    /// The program itself failed.
+    #[error("the reconstruction of {images} images failed: {why}")]
+    Command {
+        /// How many images.
+        images: u64,
+        /// What it said.
         why: String,
     },
     /// No such setting.

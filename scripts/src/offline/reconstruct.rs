@@ -13,7 +13,9 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use probepath_recon::measures::table::to_csv;
-use probepath_recon::{ImageLumen, LumenReconstruction, NoLumen, check_sweep, reconstruct_from, segment};
+use probepath_recon::{
+    ImageLumen, LumenReconstruction, NoLumen, SeedPoint, check_sweep, reconstruct_from, segment,
+};
 use serde::Serialize;
 
 use crate::progress::Progress;
@@ -34,6 +36,8 @@ pub struct ReconstructWish {
     pub calibration: Option<PathBuf>,
     /// Whether a volume is built as well.
     pub volume: bool,
+    /// A place in the lumen of the first image: right of its first column and below its first row (mm).
+    pub seed_mm: Option<(f64, f64)>,
     /// A program that finds the lumen in the place of our own finder.
     pub lumen: Option<FinderWish>,
     /// Folder for what is made.
@@ -59,6 +63,9 @@ pub struct Reconstructed {
     pub notes: Vec<String>,
     /// What each stage took.
     pub timing_s: Timing,
+    /// The most memory that the process ever held (MB), where the system says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub peak_memory_mb: Option<f64>,
     /// The report.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub report: Option<Report>,
@@ -122,7 +129,8 @@ pub fn reconstruct(
     std::fs::create_dir_all(&wish.out).map_err(folder)?;
     let (begun, mut timing) = (now(), Timing::default());
     progress.at("reading", 0.0);
-    let input = timed(&mut timing.reading, || read(wish))?;
+    let mut input = timed(&mut timing.reading, || read(wish))?;
+    input.lumen.seed = wish.seed_mm.map(|(x_mm, y_mm)| SeedPoint::Millimetres { x_mm, y_mm });
     progress.at("looking for the lumen", 0.2);
     let found = lumen(wish, &input, &mut timing);
     let mut made = Reconstructed::of(wish, &input);
@@ -143,6 +151,7 @@ pub fn reconstruct(
         made.volume = Some(timed(&mut timing.volume, build)?);
     }
     timing.total = begun.elapsed().as_secs_f64();
+    made.peak_memory_mb = peak_memory_mb();
     made.timing_s = timing;
     Ok(made)
 }
@@ -159,6 +168,14 @@ fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
     let done = work();
     *seconds += begun.elapsed().as_secs_f64();
     done
+}
+
+/// Linux says it in kB ("VmHWM"); elsewhere nobody is asked.
+fn peak_memory_mb() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kilobytes: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kilobytes / 1e3)
 }
 
 fn read(wish: &ReconstructWish) -> Result<Input, ReconstructError> {
@@ -202,6 +219,7 @@ impl Reconstructed {
             stenoses: Vec::new(),
             notes: input.notes.clone(),
             timing_s: Timing::default(),
+            peak_memory_mb: None,
             report: None,
             volume: None,
         }

@@ -38,6 +38,22 @@ impl Exam {
         Self::collect(ExamReader::open(path)?)
     }
 
+    /// The same without its ticks: a minute of them takes more memory than a hundred B-scans.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn without_ticks(path: &Path) -> Result<Self, ExamError> {
+        let mut reader = ExamReader::open(path)?;
+        let mut exam = Self::empty(reader.header().clone());
+        while let Some(event) = reader.next_event()? {
+            if !matches!(event, ExamEvent::Tick(_)) {
+                exam.add(event);
+            }
+        }
+        exam.ending = reader.ending().cloned().unwrap_or(Ending::Complete);
+        Ok(exam)
+    }
+
     /// Reads everything that a reader still has.
     ///
     /// # Errors

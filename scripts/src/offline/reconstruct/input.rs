@@ -64,7 +64,7 @@ impl Input {
 
     /// The images of an exam, with the exam's own calibration or another of the same setting.
     pub(super) fn of_exam(input: &Path, calibration: Option<&Path>) -> Result<Self, ReconstructError> {
-        let mut exam = Exam::open(input)?;
+        let mut exam = Exam::without_ticks(input)?;
         if exam.bscans.is_empty() {
             return Err(ReconstructError::NoImages { path: input.into() });
         }
