@@ -173,6 +173,14 @@ impl Session {
         truth::surface_error(self.truth()?, &lumen.recon)
     }
 
+    /// The same where the surface stands, without a fit; and the branches that were found.
+    pub fn errors_in_place(&self, lumen: &Lumen) -> [Option<SurfaceError>; 2] {
+        let truth = self.truth();
+        type Error = fn(&Truth, &probepath_recon::LumenReconstruction) -> Option<SurfaceError>;
+        let of = |error: Error| error(truth?, &lumen.recon);
+        [of(truth::error_in_place), of(truth::branch_error)]
+    }
+
     /// Every true stenosis inside a reconstruction, beside what was found; only a simulated cell can say.
     pub fn stenosis_errors(&self, lumen: &Lumen) -> Vec<StenosisError> {
         self.truth().map(|truth| truth::stenoses(truth, &lumen.recon)).unwrap_or_default()

@@ -4,7 +4,7 @@
 mod gold;
 mod sections;
 
-use probepath_recon::{Fit, LumenReconstruction, compare};
+use probepath_recon::{Fit, LumenReconstruction, LumenSurface, compare};
 use probepath_sim::{SimulatedCell, Truth, Vessel};
 use serde::{Deserialize, Serialize};
 
@@ -26,19 +26,38 @@ pub struct StenosisError {
 
 /// Distance of the reconstructed grid's measured points from the true lumen after a rigid fit ([P1] eq. 6).
 pub(super) fn surface_error(truth: &Truth, recon: &LumenReconstruction) -> Option<SurfaceError> {
-    let mut distances = error_map(truth, recon)?;
+    mean_and_p95(error_map(truth, recon, &recon.surface, Fit::Near)?)
+}
+
+/// The same where the surface stands, without a fit: what calibration and arm have moved is in it.
+pub(super) fn error_in_place(truth: &Truth, recon: &LumenReconstruction) -> Option<SurfaceError> {
+    mean_and_p95(error_map(truth, recon, &recon.surface, Fit::None)?)
+}
+
+/// The branches that were found, where they stand, beside the joined lumen; none where none was found.
+pub(super) fn branch_error(truth: &Truth, recon: &LumenReconstruction) -> Option<SurfaceError> {
+    let branches = recon.vessels.iter().skip(1);
+    let each = branches.filter_map(|branch| error_map(truth, recon, &branch.surface, Fit::None));
+    mean_and_p95(each.flatten().collect())
+}
+
+fn mean_and_p95(mut distances: Vec<f64>) -> Option<SurfaceError> {
     distances.sort_by(f64::total_cmp);
     let p95 = *distances.get(distances.len() * 95 / 100)?;
     Some(SurfaceError { mean: distances.iter().sum::<f64>() / distances.len() as f64, p95 })
 }
 
-/// Distances of the grid's points (mm), but for rows that no image shows: those only bridge a gap.
-fn error_map(truth: &Truth, recon: &LumenReconstruction) -> Option<Vec<f64>> {
+/// Distances of a grid's points (mm), but for rows that no image shows: those only bridge a gap.
+fn error_map(
+    truth: &Truth,
+    recon: &LumenReconstruction,
+    surface: &LumenSurface,
+    fit: Fit,
+) -> Option<Vec<f64>> {
     let vessel = truth.subject().main()?;
     let (from, until) = reach(vessel, recon)?;
     let gold = gold::gold(truth.subject().vessels(), from..until);
-    let surface = &recon.surface;
-    let compared = compare(&surface.mesh(), &gold, Fit::Near).ok()?;
+    let compared = compare(&surface.mesh(), &gold, fit).ok()?;
     let rows = compared.error_mm.chunks(surface.around).zip(&surface.measured);
     let seen = rows.filter(|(_, measured)| **measured).flat_map(|(row, _)| row.iter().copied());
     Some(seen.collect())

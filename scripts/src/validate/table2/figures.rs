@@ -30,11 +30,17 @@ pub(super) fn rows(row: &Row, outcomes: &[Outcome]) -> Vec<Goal> {
     };
     let mean = each(&|outcome| Some(outcome.surface_mm?.0));
     let p95 = each(&|outcome| Some(outcome.surface_mm?.1));
+    let in_place = each(&|outcome| Some(outcome.in_place_mm?.0));
+    let branches: Vec<f64> = outcomes.iter().filter_map(|outcome| Some(outcome.branches_mm?.0)).collect();
     let calibration = each(&|outcome| outcome.calibration_mm);
     let mut rows = vec![
         Goal::of(figure("surface, mean, mm"), &mean, Some(row.most_mean_mm), row.published),
         Goal::of(figure("surface, 95th percentile, mm"), &p95, Some(MOST_P95_MM), None),
     ];
+    rows.push(Goal::of(figure("surface in place, mean, mm"), &in_place, None, None));
+    if !branches.is_empty() {
+        rows.push(Goal::of(figure("branches in place, mean, mm"), &branches, None, None));
+    }
     for truth in row.true_percent() {
         rows.extend(stenosis(&figure(&format!("{truth:.0} % area")), truth, outcomes));
     }
@@ -108,6 +114,8 @@ mod tests {
             failed: None,
             calibration_mm: Some(0.1),
             surface_mm: Some((0.1, 0.3)),
+            in_place_mm: Some((0.15, 0.35)),
+            branches_mm: None,
             stenoses: vec![found(80.0), found(75.0)],
             sections: (0..200).map(section).collect(),
             images: (200, 3),

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::super::bench::{calibrated_on_the_bench, open};
 use super::settings::Row;
+use crate::report::SurfaceError;
 use crate::session::{CellFile, ScanWish, SectionError, SessionError, StenosisError, TeachWish};
 
 /// What one seed gave.
@@ -21,6 +22,12 @@ pub(super) struct Outcome {
     pub(super) calibration_mm: Option<f64>,
     /// Distance of the surface from the true lumen: mean and 95th percentile (mm).
     pub(super) surface_mm: Option<(f64, f64)>,
+    /// The same where the surface stands, without a fit.
+    #[serde(default)]
+    pub(super) in_place_mm: Option<(f64, f64)>,
+    /// The same of the branches that were found.
+    #[serde(default)]
+    pub(super) branches_mm: Option<(f64, f64)>,
     /// Every true stenosis that was scanned whole.
     pub(super) stenoses: Vec<StenosisError>,
     /// Every measured section.
@@ -52,6 +59,8 @@ impl Outcome {
         let lumen = session.reconstruct(&scan, None)?;
         self.images = (lumen.recon.counts.images, lumen.recon.counts.without_lumen);
         self.surface_mm = session.surface_error(&lumen).map(|error| (error.mean, error.p95));
+        let pair = |error: SurfaceError| (error.mean, error.p95);
+        [self.in_place_mm, self.branches_mm] = session.errors_in_place(&lumen).map(|error| error.map(pair));
         self.stenoses = session.stenosis_errors(&lumen);
         self.sections = session.section_errors(&lumen);
         Ok(())
