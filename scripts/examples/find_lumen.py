@@ -2,7 +2,7 @@
 """A lumen finder in the place of probepath's own: probepath reconstruct SEQUENCE --lumen find_lumen.py
 
 Reads images from standard input, answers one line each on standard output (docs/reconstruction.md has the protocol).
-It needs nothing but Python: rays from a centre to the wall, the log undone, the edge at half of the wall's amplitude.
+It needs nothing but Python: rays from a centre to the wall, the log undone, the edge at 0.7 of the wall's amplitude.
 Simple on purpose: put a network in the place of `lumen`.
 """
 
@@ -53,7 +53,7 @@ def first_centre(image):
 
 
 def radius_along(image, x, y, turn):
-    """Where the amplitude first reaches half of the wall's."""
+    """Where the amplitude first reaches 0.7 of the wall's: the beam smears the wall into the lumen."""
     profile = []
     for k in range(int(FARTHEST_MM / STEP_MM)):
         value = image.at(x + k * STEP_MM * math.cos(turn), y + k * STEP_MM * math.sin(turn))
@@ -66,7 +66,7 @@ def radius_along(image, x, y, turn):
     dark = sorted(smooth)[len(smooth) // 10]
     for k in range(3, len(smooth) - 8):
         wall = max(smooth[k : k + 8])
-        if smooth[k] > 0.5 * wall and wall > 6 * dark:
+        if smooth[k] > 0.7 * wall and wall > 6 * dark:
             return k * STEP_MM
     return None
 

@@ -42,6 +42,8 @@ pub(super) struct LumenProcess {
     questions: Option<Sender<(String, PlacedBScan)>>,
     answers: Receiver<std::io::Result<Vec<u8>>>,
     last_words: Arc<Mutex<Vec<u8>>>,
+    /// Disconnected once all its last words were heard.
+    silent: Receiver<()>,
     patience: Duration,
     fault: Option<FinderFault>,
     declined: BTreeMap<String, usize>,
@@ -63,9 +65,13 @@ impl LumenProcess {
             .spawn();
         let mut child = started.map_err(|source| FinderFault::Start { name: name.clone(), source })?;
         let last_words = Arc::new(Mutex::new(Vec::new()));
+        let (speaks, silent) = channel();
         if let Some(stderr) = child.stderr.take() {
             let kept = Arc::clone(&last_words);
-            thread::spawn(move || listen(stderr, &kept));
+            thread::spawn(move || {
+                listen(stderr, &kept);
+                drop::<Sender<()>>(speaks);
+            });
         }
         let (to_answers, answers) = channel();
         if let Some(stdout) = child.stdout.take() {
@@ -82,6 +88,7 @@ impl LumenProcess {
             questions: Some(questions),
             answers,
             last_words,
+            silent,
             patience,
             fault: None,
             declined: BTreeMap::new(),
@@ -141,6 +148,7 @@ impl LumenProcess {
         // It closed its output: it has gone, or is about to.
         self.questions = None;
         let status = gone(&mut self.child);
+        let _all_was_said = self.silent.recv_timeout(Duration::from_millis(500));
         let how = status.map_or_else(|| "it closed its output".into(), |status| status.to_string());
         FinderFault::Died { name: self.name.clone(), number, how, said: self.said() }
     }
