@@ -121,6 +121,27 @@ impl Tree {
         index
     }
 
+    /// Where a place lies along a curve that runs through the mesh's box and keeps neighbours together: the bits of its
+    /// coordinates in turn.
+    pub(super) fn along_curve(&self, place: &Vector3<f64>) -> u64 {
+        let spread = |x: f32| {
+            // Twenty bits, two zeros after each.
+            let mut bits = ((x.clamp(-1.0, 1.0) + 1.0) * 524_287.5) as u64;
+            for (shift, mask) in [
+                (32, 0x1f_0000_0000_ffff),
+                (16, 0x1f_0000_ff00_00ff),
+                (8, 0x100f_00f0_0f00_f00f),
+                (4, 0x10c3_0c30_c30c_30c3),
+                (2, 0x1249_2492_4924_9249),
+            ] {
+                bits = (bits | (bits << shift)) & mask;
+            }
+            bits
+        };
+        let [x, y, z] = self.own(place).map(spread);
+        x | (y << 1) | (z << 2)
+    }
+
     /// A place as the tree sees it.
     pub(super) fn asked(&self, place: &Vector3<f64>) -> Asked {
         let own = self.own(place);
