@@ -33,7 +33,7 @@ pub enum Command {
     /// How far a surface is from a gold standard.
     Compare(Compare),
     /// Between the formats of sequences (.igs.mha, .igs.mhd, .igs.nrrd), of volumes (.mha, .nrrd), and of surfaces
-    /// (.stl, .ply, .vtp).
+    /// (.stl, .ply, .vtp); and from an exam (.mcap) to a DICOM multi-frame image (.dcm).
     Convert(Convert),
     /// What the model of an arm says; forward and inverse kinematics. Or how punctual an arm on its wire is.
     Arm(Arm),
@@ -100,9 +100,42 @@ pub struct Compare {
     /// The gold standard (.stl, .ply, .vtp), mm.
     #[arg(long, value_name = "SURFACE")]
     pub gold: PathBuf,
-    /// Compare where they are: no rigid fit first.
-    #[arg(long)]
+    /// How the surface is laid on the gold standard first.
+    #[arg(long, value_enum, default_value_t = FitOf::Rigid)]
+    pub fit: FitOf,
+    /// Compare where they are: the same as `--fit none`.
+    #[arg(long, conflicts_with = "fit")]
     pub in_place: bool,
+    /// The unit of the gold standard's file: surface files do not say theirs, and are read as millimetres.
+    #[arg(long, value_enum, default_value_t = Unit::Mm)]
+    pub gold_unit: Unit,
+    /// Folder for the error map: pictures (PNG) and a coloured mesh (PLY, VTP).
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+/// How a surface is laid on another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum FitOf {
+    /// Centre of gravity, then the rigid motion that minimises the distances (the paper's).
+    Rigid,
+    /// The same from where both lie.
+    Near,
+    /// Iterated closest points, robust against parts that the gold standard has not.
+    Icp,
+    /// Not at all.
+    None,
+}
+
+/// A unit of length.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Unit {
+    /// Millimetres.
+    Mm,
+    /// Centimetres.
+    Cm,
+    /// Metres.
+    M,
 }
 
 /// `convert`
@@ -112,6 +145,9 @@ pub struct Convert {
     pub input: PathBuf,
     /// What to write; the ending says the format.
     pub output: PathBuf,
+    /// Of an exam on its way to DICOM: you have looked, and nothing is written into its pictures.
+    #[arg(long)]
+    pub no_burned_in: bool,
 }
 
 /// `arm`

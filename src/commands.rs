@@ -8,7 +8,7 @@ use std::error::Error;
 use probepath_scripts::session::MeasureRequest;
 use probepath_scripts::{Operator, ScanRequest, offline, validate};
 
-use crate::cli::{Command, Goal};
+use crate::cli::{Command, FitOf, Goal, Unit};
 use crate::screen::{Document, Screen};
 
 type Outcome = Result<Document, Box<dyn Error>>;
@@ -22,13 +22,32 @@ pub fn perform(command: Command, screen: &Screen) -> Outcome {
         Command::Scan(args) => return scan(args, screen),
         Command::Calibrate(which) => return calibrate::perform(which, screen),
         Command::Reconstruct(args) => return reconstruct(args, screen),
-        Command::Compare(args) => Document::of(&offline::compare(&args.surface, &args.gold, !args.in_place)?),
-        Command::Convert(args) => Document::of(&offline::convert(&args.input, &args.output)?),
+        Command::Compare(args) => Document::of(&offline::compare(&compared(args))?),
+        Command::Convert(args) => {
+            Document::of(&offline::convert(&args.input, &args.output, args.no_burned_in)?)
+        }
         Command::Simulate(args) => return simulate::perform(args, screen),
         Command::Arm(args) => return arm(args),
         Command::Validate(args) => return validated(&args, screen),
     };
     Ok(document?)
+}
+
+fn compared(args: crate::cli::Compare) -> offline::CompareWish {
+    let crate::cli::Compare { surface, gold, fit, in_place, gold_unit, out } = args;
+    let fit = match fit {
+        _ if in_place => offline::Fit::None,
+        FitOf::Rigid => offline::Fit::Rigid,
+        FitOf::Near => offline::Fit::Near,
+        FitOf::Icp => offline::Fit::Icp,
+        FitOf::None => offline::Fit::None,
+    };
+    let gold_unit_mm = match gold_unit {
+        Unit::Mm => 1.0,
+        Unit::Cm => 10.0,
+        Unit::M => 1000.0,
+    };
+    offline::CompareWish { surface, gold, fit, gold_unit_mm, out }
 }
 
 fn arm(args: crate::cli::Arm) -> Outcome {

@@ -111,6 +111,11 @@ impl Mesh {
         std::fs::write(path, bytes).map_err(|source| MeshError::File { path: name, source })
     }
 
+    /// The bytes of a binary STL (mm, LPS), for where they go into something else than a file.
+    pub fn stl_bytes(&self) -> Vec<u8> {
+        stl::bytes(self)
+    }
+
     /// Refuses numbers that are not finite and triangles of points that are not there.
     fn checked(self) -> Result<Self, String> {
         if self.points.is_empty() || self.triangles.is_empty() {

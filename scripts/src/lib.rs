@@ -16,6 +16,7 @@
 //!
 //! What it does not do: know any screen or network. It tells its progress to whoever listens.
 
+pub mod dicom;
 pub mod offline;
 mod options;
 mod progress;

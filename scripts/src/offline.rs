@@ -11,7 +11,7 @@ mod reconstruct;
 mod simulate;
 
 pub use arm::{ArmAnswer, ArmError, ArmQuestion, arm};
-pub use compare::{CompareError, Comparison, compare};
+pub use compare::{CompareError, CompareWish, Comparison, Fit, compare};
 pub use convert::{ConvertError, Converted, convert};
 pub use reconstruct::{
     FinderFault, FinderWish, ImagesOf, ReconstructError, ReconstructWish, Reconstructed, Timing, VolumeMade,

@@ -5,9 +5,13 @@
 
 pub mod bscan_picture;
 pub mod build;
+pub mod colours;
 pub mod curve;
+pub mod drawing;
+pub mod error_map;
 pub mod html;
 pub mod picture;
+pub mod pictures;
 pub mod surface_picture;
 mod text;
 
@@ -30,6 +34,9 @@ pub struct Report {
     pub area_curve: Vec<AreaPoint>,
     /// How the contact force was held.
     pub force_n: ForceFigures,
+    /// Mean contact force over the B-scans that show the lumen (N); none without a sensor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mean_force_n: Option<f64>,
     /// What became of the B-scans.
     pub images: ImageCounts,
     /// How well the replay kept to the taught path.
@@ -42,6 +49,10 @@ pub struct Report {
     pub report: String,
     /// The lumen surfaces.
     pub surfaces: Vec<String>,
+    /// The pictures beside the page (PNG).
+    pub pictures: Vec<String>,
+    /// The surface and the measures as DICOM.
+    pub dicom: Vec<String>,
     /// What the reader must know before believing a number.
     pub warnings: Vec<String>,
 }
@@ -56,6 +67,9 @@ pub struct Heading {
     /// Date of the exam, as given; none in a simulated cell.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub date: Option<String>,
+    /// Who held the probe, as a code; never a name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub operator: Option<String>,
     /// What was scanned with: the cell's name.
     pub cell: String,
     /// Protocol's name.
@@ -122,6 +136,11 @@ pub struct StenosisRow {
     pub percent_diameter_interval: [f64; 2],
     /// Grade by percent diameter: 1-19 / 20-49 / 50-99 % / occluded.
     pub grade: String,
+    /// Where the narrowing begins (mm).
+    pub from_mm: f64,
+    /// Mean contact force while it was imaged (N); none without a sensor.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub force_n: Option<f64>,
     /// Where the lumen is smallest: distance along the centreline from the scan's proximal end (mm).
     pub at_mm: f64,
     /// Its 95 % interval (mm).

@@ -2,14 +2,17 @@
 
 use std::path::{Path, PathBuf};
 
-use probepath_recon::{LumenReconstruction, Mesh, MeshError, Stenosis};
+use probepath_frames::{Point, World};
+use probepath_recon::{LumenReconstruction, Mesh, MeshError, Section, Stenosis};
 use probepath_us_capture::PlacedBScan;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::html::{self, Pictures, Surface};
-use super::picture::Picture;
-use super::surface_picture::{self, Camera, SurfaceView};
+use crate::dicom::{Date, DicomError, Finding, Study, encapsulated_stl, structured_report};
+
+use super::html::{self, Pictures};
+use super::picture::{self, Picture};
+use super::pictures;
 use super::{
     AreaPoint, ForceFigures, Heading, ImageCounts, PathFigures, Report, SegmentRow, StenosisRow,
     SurfaceError, grade,
@@ -79,32 +82,52 @@ pub enum ReportError {
     /// A picture cannot be drawn.
     #[error("a picture cannot be drawn: {0}")]
     Picture(#[from] png::EncodingError),
+    /// A DICOM file cannot be made.
+    #[error(transparent)]
+    Dicom(#[from] DicomError),
     /// The numbers cannot be written as JSON.
     #[error("the numbers cannot be written: {0}")]
     Json(#[from] serde_json::Error),
 }
 
-/// Names, with the column and row where each is written.
-type Labels = Vec<(String, (f64, f64))>;
+/// The curve as a picture has so many pixels for each unit of the drawing.
+const FINE: f64 = 2.0;
 
-/// Size of the surface's picture.
-const SURFACE_PIXELS: (usize, usize) = (1680, 420);
-/// At most so many B-scans in a report.
-const MOST_BSCANS: usize = 6;
-
-/// Writes `lumen.stl`, `.ply`, `.vtp`, `lumen.png`, `report.html` and `report.json` into `folder`.
+/// Writes into `folder`: `lumen.stl`, `.ply` and `.vtp`; `report.html` and `report.json`; the pictures as `lumen.png`,
+/// `area-curve.png` and `bscan-1.png` …; `lumen-stl.dcm` and `report-sr.dcm`.
 ///
 /// # Errors
 /// When a file cannot be written or a picture not be drawn.
 pub fn make(from: &Ingredients<'_>, folder: &Path) -> Result<Report, ReportError> {
-    let mesh = from.recon.surface.mesh();
+    let mesh = from.recon.closed_surface();
     let surfaces = save_surfaces(&mesh, folder)?;
     let page = folder.join("report.html");
-    let report = numbers(from, &surfaces, &page);
-    let pictures = pictures(from, &mesh, &folder.join("lumen.png"))?;
+    let mut report = numbers(from, &surfaces, &page);
+    let pictures = pictures(from, &mesh, &mut report, folder)?;
+    dicom(from, &mesh, &mut report, folder)?;
     write(&page, html::page(&report, &pictures).as_bytes())?;
     write(&folder.join("report.json"), &serde_json::to_vec_pretty(&report)?)?;
     Ok(report)
+}
+
+/// The surface and the measures as DICOM. An exam whose day nobody knows has no structured report: it needs one.
+fn dicom(from: &Ingredients<'_>, mesh: &Mesh, report: &mut Report, folder: &Path) -> Result<(), ReportError> {
+    let of = &from.heading;
+    let day = of.date.as_deref().and_then(Date::of_day).or_else(|| Date::of_file(from.exam));
+    let study = Study::of(&of.study, &of.side, day, from.images);
+    let (stl, sr) = (folder.join("lumen-stl.dcm"), folder.join("report-sr.dcm"));
+    encapsulated_stl(mesh, &study, &stl)?;
+    report.dicom.push(stl.display().to_string());
+    let found = report.stenoses.iter().map(|row| Finding {
+        stenosis: row.clone(),
+        place_mm: from.recon.centreline.at(row.at_mm * 1e-3).map(|at| (at.point.vector() * 1e3).into()),
+    });
+    match structured_report(&found.collect::<Vec<_>>(), &report.warnings, &study, &sr) {
+        Ok(()) => report.dicom.push(sr.display().to_string()),
+        Err(DicomError::NoDate) => report.warnings.push(DicomError::NoDate.to_string()),
+        Err(other) => return Err(other.into()),
+    }
+    Ok(())
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
@@ -127,9 +150,10 @@ fn numbers(from: &Ingredients<'_>, surfaces: &[PathBuf], page: &Path) -> Report 
     Report {
         exam_of: from.heading.clone(),
         surface_error_mm: from.surface_error,
-        stenoses: recon.stenoses.iter().enumerate().map(|(i, s)| stenosis_row(i, s, from.segments)).collect(),
+        stenoses: recon.stenoses.iter().enumerate().map(|(i, s)| stenosis_row(i, s, from)).collect(),
         segments: from.segments.iter().filter_map(|s| segment_row(s, recon)).collect(),
-        area_curve: area_curve(recon),
+        area_curve: area_points(recon),
+        mean_force_n: mean_force_n(from, 0.0..f64::INFINITY),
         force_n: figures.force_n,
         images: ImageCounts {
             kept: from.images.len(),
@@ -141,13 +165,15 @@ fn numbers(from: &Ingredients<'_>, surfaces: &[PathBuf], page: &Path) -> Report 
         exam: from.exam.display().to_string(),
         report: page.display().to_string(),
         surfaces: surfaces.iter().map(|path| path.display().to_string()).collect(),
+        pictures: Vec::new(),
+        dicom: Vec::new(),
         warnings,
     }
 }
 
-fn stenosis_row(index: usize, found: &Stenosis, segments: &[Segment]) -> StenosisRow {
+fn stenosis_row(index: usize, found: &Stenosis, from: &Ingredients<'_>) -> StenosisRow {
     let at_m = found.at_mm * 1e-3;
-    let segment = segments.iter().find(|s| (s.from_m..s.until_m).contains(&at_m));
+    let segment = from.segments.iter().find(|s| (s.from_m..s.until_m).contains(&at_m));
     StenosisRow {
         name: format!("S{}", index + 1),
         segment: segment.map(|s| s.name.clone()).unwrap_or_default(),
@@ -157,6 +183,8 @@ fn stenosis_row(index: usize, found: &Stenosis, segments: &[Segment]) -> Stenosi
         percent_diameter: found.percent_diameter,
         percent_diameter_interval: found.percent_diameter_interval,
         grade: grade(found.percent_diameter).into(),
+        from_mm: found.from_mm,
+        force_n: mean_force_n(from, found.from_mm..found.from_mm + found.length_mm),
         at_mm: found.at_mm,
         at_interval_mm: found.at_interval_mm,
         length_mm: found.length_mm,
@@ -171,6 +199,22 @@ fn stenosis_row(index: usize, found: &Stenosis, segments: &[Segment]) -> Stenosi
         reference_area_mm2: found.reference_area_mm2,
         reference: found.reference.to_string(),
     }
+}
+
+/// Mean of what the probe pressed with while the vessel was seen between two places (mm along it).
+fn mean_force_n(from: &Ingredients<'_>, along_mm: std::ops::Range<f64>) -> Option<f64> {
+    let sections = &from.recon.sections;
+    let near = |place: &Point<World>| {
+        let apart = |s: &Section| s.centre.distance(place);
+        sections.iter().min_by(|a, b| apart(a).total_cmp(&apart(b))).map(|section| section.at_mm)
+    };
+    let seen = from.recon.images.iter().zip(from.images);
+    let pressed = seen.filter_map(|(found, image)| {
+        let at = near(&found.lumen.as_ref().ok()?.centre)?;
+        along_mm.contains(&at).then_some(-image.wrench.as_ref()?.force.z)
+    });
+    let forces: Vec<f64> = pressed.collect();
+    (!forces.is_empty()).then(|| forces.iter().sum::<f64>() / forces.len() as f64)
 }
 
 /// What was measured in a segment; none where nothing was.
@@ -200,8 +244,8 @@ fn segment_row(segment: &Segment, recon: &LumenReconstruction) -> Option<Segment
     })
 }
 
-fn area_curve(recon: &LumenReconstruction) -> Vec<AreaPoint> {
-    let point = |section: &probepath_recon::Section| AreaPoint {
+pub(super) fn area_points(recon: &LumenReconstruction) -> Vec<AreaPoint> {
+    let point = |section: &Section| AreaPoint {
         at_mm: section.at_mm,
         area_mm2: section.measure.as_ref().map(|m| m.area_mm2),
         area_interval_mm2: section.measure.as_ref().map(|m| m.area_interval_mm2),
@@ -209,94 +253,30 @@ fn area_curve(recon: &LumenReconstruction) -> Vec<AreaPoint> {
     recon.sections.iter().map(point).collect()
 }
 
-/// The surface and the B-scans at the stenoses; the surface is also left as a file of its own.
-fn pictures(lumen: &Ingredients<'_>, mesh: &Mesh, file: &Path) -> Result<Pictures, ReportError> {
-    let mut pictures = Pictures::default();
-    if let Some((surface, labels)) = surface_picture(lumen, mesh) {
-        write(file, &surface.png()?)?;
-        pictures.surface = Some(Surface { uri: surface.data_uri()?, size: SURFACE_PIXELS, labels });
+/// Draws the pictures, leaves each as a file, and gives what the page holds of them.
+fn pictures(
+    from: &Ingredients<'_>,
+    mesh: &Mesh,
+    report: &mut Report,
+    folder: &Path,
+) -> Result<Pictures, ReportError> {
+    let mut drawn = Pictures::default();
+    let rows = report.stenoses.clone();
+    let mut save = |name: String, picture: &Picture| -> Result<String, ReportError> {
+        let (path, bytes) = (folder.join(name), picture.png()?);
+        write(&path, &bytes)?;
+        report.pictures.push(path.display().to_string());
+        Ok(picture::address(&bytes))
+    };
+    if let Some(picture) = pictures::surface(mesh, from.recon, &rows) {
+        drawn.surface = Some(save("lumen.png".into(), &picture)?);
     }
-    for (caption, image, contour) in chosen(lumen) {
-        pictures.bscans.push((caption, super::bscan_picture::draw(&image.bscan, contour).data_uri()?));
+    let curve = pictures::area_curve(from.recon, &rows);
+    save("area-curve.png".into(), &curve.picture(FINE))?;
+    drawn.area_curve = curve.svg();
+    for (i, shown) in pictures::bscans(from.recon, from.images, &rows).into_iter().enumerate() {
+        let uri = save(format!("bscan-{}.png", i + 1), &shown.picture)?;
+        drawn.bscans.push((shown.caption, uri));
     }
-    Ok(pictures)
-}
-
-/// The picture, and the stenoses' names with their places on it.
-fn surface_picture(lumen: &Ingredients<'_>, mesh: &Mesh) -> Option<(Picture, Labels)> {
-    let (width, height) = SURFACE_PIXELS;
-    let recon = lumen.recon;
-    let reference = reference_area(recon)?;
-    let vertices_mm: Vec<[f64; 3]> = mesh.points.iter().map(|p| (p * 1e3).into()).collect();
-    let narrowing: Vec<f64> =
-        mesh.points.iter().map(|p| (1.0 - area_near(recon, p) / reference).clamp(0.0, 1.0)).collect();
-    let view = SurfaceView { vertices_mm: &vertices_mm, triangles: &mesh.triangles, narrowing: &narrowing };
-    let camera = Camera::facing(view.vertices_mm, width, height)?;
-    let mut picture = surface_picture::render(&view, &camera, width, height);
-    let mut labels = Vec::new();
-    for (index, stenosis) in recon.stenoses.iter().enumerate() {
-        let at = recon.centreline.at(stenosis.at_mm * 1e-3)?.point.vector() * 1e3;
-        let (x, y, _) = camera.project(at.into());
-        labels.push((format!("S{}", index + 1), (x, y - 82.0)));
-        for (from, until) in [((x, y - 74.0), (x, y - 34.0)), ((x, y + 34.0), (x, y + 74.0))] {
-            picture.line(from, until, [106, 27, 154]);
-            picture.line((from.0 + 1.0, from.1), (until.0 + 1.0, until.1), [106, 27, 154]);
-        }
-    }
-    Some((picture, labels))
-}
-
-/// The median area stands for the open lumen.
-fn reference_area(recon: &LumenReconstruction) -> Option<f64> {
-    let mut areas: Vec<f64> =
-        recon.sections.iter().filter_map(|s| Some(s.measure.as_ref()?.area_mm2)).collect();
-    areas.sort_by(f64::total_cmp);
-    areas.get(areas.len() / 2).copied()
-}
-
-fn area_near(recon: &LumenReconstruction, vertex: &nalgebra::Vector3<f64>) -> f64 {
-    recon
-        .sections
-        .iter()
-        .filter_map(|s| Some(((s.centre.vector() - vertex).norm_squared(), s.measure.as_ref()?.area_mm2)))
-        .min_by(|a, b| a.0.total_cmp(&b.0))
-        .map_or(0.0, |(_, area)| area)
-}
-
-/// The contour in a B-scan's pixels (column, row), where a lumen was seen.
-type Contour<'a> = Option<&'a [(f64, f64)]>;
-/// What a B-scan shows, the B-scan, and its contour.
-type Chosen<'a> = (String, &'a PlacedBScan, Contour<'a>);
-
-/// The B-scan nearest to each stenosis and, before them, one of open lumen.
-fn chosen<'a>(lumen: &Ingredients<'a>) -> Vec<Chosen<'a>> {
-    let recon = lumen.recon;
-    let mut wanted: Vec<(String, f64)> = recon
-        .stenoses
-        .iter()
-        .enumerate()
-        .map(|(i, s)| {
-            (format!("S{}: {:.0} % of the area lost, at {:.0} mm", i + 1, s.percent_area, s.at_mm), s.at_mm)
-        })
-        .collect();
-    if let Some(open) = recon.sections.get(recon.sections.len() / 20) {
-        wanted.insert(0, (format!("Near the proximal end, at {:.0} mm", open.at_mm), open.at_mm));
-    }
-    wanted.truncate(MOST_BSCANS);
-    wanted
-        .into_iter()
-        .filter_map(|(caption, at_mm)| nearest(lumen, at_mm).map(|(i, c)| (caption, i, c)))
-        .collect()
-}
-
-fn nearest<'a>(lumen: &Ingredients<'a>, at_mm: f64) -> Option<(&'a PlacedBScan, Contour<'a>)> {
-    let place = lumen.recon.centreline.at(at_mm * 1e-3)?.point;
-    lumen
-        .recon
-        .images
-        .iter()
-        .zip(lumen.images)
-        .filter_map(|(found, image)| Some((found.lumen.as_ref().ok()?, image)))
-        .min_by(|a, b| a.0.centre.distance(&place).total_cmp(&b.0.centre.distance(&place)))
-        .map(|(contour, image)| (image, Some(contour.pixels.as_slice())))
+    Ok(drawn)
 }

@@ -2,27 +2,17 @@
 
 use std::fmt::Write as _;
 
-use super::curve::{self, Mark};
 use super::{Report, StenosisRow};
 
 /// The pictures of a page, as addresses that hold them (`data:`).
 #[derive(Clone, Debug, Default)]
 pub struct Pictures {
     /// The lumen surface with the stenoses marked.
-    pub surface: Option<Surface>,
+    pub surface: Option<String>,
+    /// The area curve, an inline SVG.
+    pub area_curve: String,
     /// B-scans with the contour drawn: what each shows, and the picture.
     pub bscans: Vec<(String, String)>,
-}
-
-/// The surface's picture, and what stands where on it.
-#[derive(Clone, Debug, Default)]
-pub struct Surface {
-    /// The picture, as an address that holds it.
-    pub uri: String,
-    /// Its width and height in pixels.
-    pub size: (usize, usize),
-    /// Names, with the column and row where each is written.
-    pub labels: Vec<(String, (f64, f64))>,
 }
 
 /// Text made safe inside a page.
@@ -47,8 +37,8 @@ pub fn page(report: &Report, pictures: &Pictures) -> String {
     heading(&mut body, report);
     warnings(&mut body, report);
     stenoses(&mut body, &report.stenoses);
-    surface(&mut body, pictures.surface.as_ref());
-    area(&mut body, report);
+    surface(&mut body, pictures.surface.as_deref());
+    area(&mut body, pictures);
     segments(&mut body, report);
     bscans(&mut body, pictures);
     conditions(&mut body, report);
@@ -64,18 +54,23 @@ fn heading(body: &mut String, report: &Report) {
     let of = &report.exam_of;
     let _ = write!(
         body,
-        "<header><h1>Artery of the {} leg</h1><p>Study <b>{}</b>{}</p></header>",
-        escape(&of.side),
+        "<header><h1>{}</h1><p>Study <b>{}</b> · {} · operator {}</p></header>",
+        if of.side.is_empty() {
+            "Leg artery, side not given".into()
+        } else {
+            format!("Artery of the {} leg", escape(&of.side))
+        },
         escape(&of.study),
-        of.date.as_deref().map(|d| format!(" · {}", escape(d))).unwrap_or_default()
+        escape(of.date.as_deref().unwrap_or("date not given")),
+        escape(of.operator.as_deref().unwrap_or("not given"))
     );
     let worst = report.stenoses.iter().max_by(|a, b| a.percent_area.total_cmp(&b.percent_area));
     let verdict = worst.map_or_else(
         || "No stenosis found in the scanned length.".to_owned(),
         |s| {
             format!(
-                "{} found. The tightest, {}{}, leaves {:.1} mm² of {:.1} mm²: <b>{:.0} % of the area</b>, {:.0} % of the \
-                 diameter, {:.0} mm from the proximal end.",
+                "{} found. The tightest, {}{}, leaves {:.1} mm² of {:.1} mm²: <b>{:.0} % of the area</b> and {:.0} % of the \
+                 diameter are lost, {:.0} mm from the proximal end.",
                 count(report.stenoses.len(), "stenosis", "stenoses"),
                 s.name,
                 if s.segment.is_empty() { String::new() } else { format!(" ({})", escape(&s.segment)) },
@@ -111,69 +106,71 @@ fn stenoses(body: &mut String, rows: &[StenosisRow]) {
         return;
     }
     body.push_str(
-        "<h2>Stenoses</h2><table><thead><tr><th></th><th>Segment</th><th>Area lost</th><th>Diameter lost</th>\
-         <th>Grade</th><th>At</th><th>Length</th><th>Smallest lumen</th><th>Off the middle</th><th>Reference</th></tr></thead><tbody>",
+        "<h2>Stenoses</h2><table class='lesions'><thead><tr><th></th><th>Segment</th><th>Area lost</th>\
+         <th>Diameter lost</th><th>Grade by<br>diameter</th><th>Place</th><th>Length</th><th>Least<br>area</th><th>Least<br>diameter</th>\
+         <th>Off the<br>middle</th><th>Force</th><th>Reference</th></tr></thead><tbody>",
     );
     for s in rows {
-        let _ = write!(
-            body,
-            "<tr><th>{}</th><td>{}</td><td class='n'>{:.1} %{}</td><td class='n'>{:.1} %{}</td><td class='n'>{}</td>\
-             <td class='n'>{:.1} mm</td><td class='n'>{:.1} mm{}{}</td><td class='n'>{:.1} mm²{}{:.1} mm{}</td>\
-             <td class='n'>{}</td><td>{:.1} mm², {}</td></tr>",
-            escape(&s.name),
-            escape(&s.segment),
-            s.percent_area,
-            interval(s.percent_area_interval),
-            s.percent_diameter,
-            interval(s.percent_diameter_interval),
-            escape(&s.grade),
-            s.at_mm,
-            s.length_mm,
-            interval(s.length_interval_mm),
-            if s.cut_off { "runs on beyond the scan" } else { "" },
-            s.min_area_mm2,
-            interval(s.min_area_interval_mm2),
-            s.min_diameter_mm,
-            interval(s.min_diameter_interval_mm),
-            s.asymmetry.map_or_else(|| "not known".to_owned(), |part| format!("{part:.2}")),
-            s.reference_area_mm2,
-            escape(&s.reference)
-        );
-    }
-    body.push_str("</tbody></table>");
-}
-
-/// A 95 % interval, in small under its number.
-fn interval([low, high]: [f64; 2]) -> String {
-    format!("<small>{low:.1} to {high:.1}</small>")
-}
-
-fn surface(body: &mut String, surface: Option<&Surface>) {
-    let Some(Surface { uri, size: (width, height), labels }) = surface else { return };
-    let _ = write!(
-        body,
-        "<figure><svg viewBox='0 0 {width} {height}' role='img' aria-label='lumen surface'>\
-         <image width='{width}' height='{height}' href='{uri}'/>"
-    );
-    for (name, (x, y)) in labels {
-        let name = escape(name);
-        let _ = write!(body, "<text class='label' x='{x:.0}' y='{y:.0}' text-anchor='middle'>{name}</text>");
+        stenosis(body, s);
     }
     body.push_str(
-        "</svg><figcaption>Lumen surface, proximal end left, seen from the front; the darker, the narrower.\
-         </figcaption></figure>",
+        "</tbody></table><p class='note'>In brackets: 95 % intervals. Area and diameter lost are against the reference \
+         in the same row; half the diameter is three quarters of the area. Place: the narrowest section, along the \
+         centreline from the scan's proximal end. Off the middle: 0 in the vessel's middle, 1 against its wall.</p>",
     );
 }
 
-fn area(body: &mut String, report: &Report) {
-    let points: Vec<_> =
-        report.area_curve.iter().map(|p| (p.at_mm, p.area_mm2.unwrap_or(f64::NAN))).collect();
-    let marks: Vec<_> = report
-        .stenoses
-        .iter()
-        .map(|s| Mark { at_mm: s.at_mm, label: format!("{} {:.0} %", s.name, s.percent_area) })
-        .collect();
-    let _ = write!(body, "<h2>Lumen area</h2><figure>{}</figure>", curve::area_curve(&points, &marks));
+fn stenosis(body: &mut String, s: &StenosisRow) {
+    let span = |[low, high]: [f64; 2]| format!("<span class='span'>[{low:.1}, {high:.1}]</span>");
+    let force = s.force_n.map_or_else(|| "not measured".into(), |force| format!("{force:.1} N"));
+    let asymmetry = s.asymmetry.map_or_else(|| "not known".to_owned(), |part| format!("{part:.2}"));
+    let cells = [
+        format!("<b>{:.1} %</b>{}", s.percent_area, span(s.percent_area_interval)),
+        format!("<b>{:.1} %</b>{}", s.percent_diameter, span(s.percent_diameter_interval)),
+        escape(&s.grade),
+        format!("{:.1} mm{}", s.at_mm, span(s.at_interval_mm)),
+        format!(
+            "{:.1} mm{}{}",
+            s.length_mm,
+            span(s.length_interval_mm),
+            if s.cut_off { "<span class='span'>runs on beyond the scan</span>" } else { "" }
+        ),
+        format!("{:.1} mm²{}", s.min_area_mm2, span(s.min_area_interval_mm2)),
+        format!("{:.1} mm{}", s.min_diameter_mm, span(s.min_diameter_interval_mm)),
+        asymmetry,
+        force,
+    ];
+    let (name, segment) = (escape(&s.name), escape(&s.segment));
+    let _ = write!(body, "<tr><th>{name}</th><td>{}</td>", or_not_named(&segment));
+    for cell in cells {
+        let _ = write!(body, "<td class='n'>{cell}</td>");
+    }
+    let reference = escape(&s.reference);
+    let _ =
+        write!(body, "<td>{:.1} mm²<span class='span'>{reference}</span></td></tr>", s.reference_area_mm2);
+}
+
+fn or_not_named(text: &str) -> &str {
+    if text.is_empty() { "not named" } else { text }
+}
+
+fn surface(body: &mut String, uri: Option<&str>) {
+    let Some(uri) = uri else { return };
+    let _ = write!(
+        body,
+        "<h2>Lumen</h2><figure><img alt='the lumen surface from two sides' src='{uri}'><figcaption>The lumen's surface, \
+         proximal end left. L, R, A, P, F: toward the patient's left, right, front, back, feet.</figcaption></figure>"
+    );
+}
+
+fn area(body: &mut String, pictures: &Pictures) {
+    let _ = write!(
+        body,
+        "<h2>Lumen area</h2><figure>{}<figcaption>Area of the sections normal to the centreline; the band is the 95 % \
+         interval, shaded columns the extent of each stenosis. Where the line is broken, nothing was measured.</figcaption>\
+         </figure>",
+        pictures.area_curve
+    );
 }
 
 fn segments(body: &mut String, report: &Report) {
@@ -234,8 +231,12 @@ fn conditions(body: &mut String, report: &Report) {
         (
             "Contact",
             format!(
-                "set {:.1} N, error {:.2} N RMS, overshoot {:.2} N at touch-down, largest {:.2} N",
-                report.force_n.set, report.force_n.rms_error, report.force_n.overshoot, report.force_n.max
+                "{}set {:.1} N, error {:.2} N RMS, overshoot {:.2} N at touch-down, largest {:.2} N",
+                report.mean_force_n.map(|mean| format!("mean {mean:.1} N, ")).unwrap_or_default(),
+                report.force_n.set,
+                report.force_n.rms_error,
+                report.force_n.overshoot,
+                report.force_n.max
             ),
         ),
         (
@@ -268,31 +269,34 @@ fn conditions(body: &mut String, report: &Report) {
     }
     body.push_str("</tbody></table>");
     body.push_str(
-        "<footer>B-mode lumen geometry, not a Doppler grade. A research tool, not a medical device. Percent of area and \
-         of diameter are against the reference named in the row. Two small numbers: the 95 % interval. Distances are along the centreline from the scan's \
-         proximal end. Surfaces and volumes: millimetres, LPS.</footer>",
+        "<footer><b>B-mode lumen geometry, not a Doppler grade. A research tool, not a medical device.</b> Flow was not \
+         measured. The probe's pressure flattens an artery: the force is in the table. Intervals hold what the images, \
+         poses and calibration leave open, not what another observer would have scanned. Surfaces and volumes: \
+         millimetres, LPS.</footer>",
     );
 }
 
 const STYLE: &str = "\
-:root{color-scheme:light;--ink:#1c2430;--soft:#5c6878;--line:#dfe4ea;--mark:#6a1b9a;--blood:#c0392b}\
-body{margin:0;background:#f4f6f8;color:var(--ink);font:15px/1.5 system-ui,-apple-system,'Segoe UI',Roboto,'Helvetica Neue',Arial,sans-serif}\
-main{max-width:920px;margin:0 auto;background:#fff;padding:32px 40px 40px}\
-header{display:flex;justify-content:space-between;align-items:baseline;border-bottom:2px solid var(--ink)}\
-h1{font-size:24px;margin:0 0 6px}h2{font-size:16px;margin:28px 0 8px}header p{margin:0;color:var(--soft)}\
-.verdict{font-size:17px;margin:16px 0}\
+:root{color-scheme:light;--ink:#1c2430;--soft:#5c6878;--line:#dfe4ea;--mark:#005aa0}\
+body{margin:0;background:#eef1f4;color:var(--ink);font:15px/1.5 system-ui,-apple-system,'Segoe UI',Roboto,'Helvetica Neue',Arial,sans-serif}\
+main{max-width:980px;margin:24px auto;background:#fff;padding:36px 48px 44px;box-shadow:0 1px 3px rgba(20,30,50,.12)}\
+header{display:flex;flex-wrap:wrap;gap:0 24px;justify-content:space-between;align-items:baseline;border-bottom:2px solid var(--ink)}\
+h1{font-size:25px;font-weight:600;margin:0 0 6px}h2{font-size:16px;font-weight:600;margin:30px 0 8px}\
+header p{margin:0 0 6px;color:var(--soft)}\
+.verdict{font-size:18px;line-height:1.45;margin:18px 0}\
 .warnings{background:#fff6e0;border-left:4px solid #e0a100;margin:12px 0;padding:10px 10px 10px 28px}\
 table{border-collapse:collapse;width:100%;font-size:14px}\
-th,td{text-align:left;padding:5px 8px;border-bottom:1px solid var(--line);vertical-align:top}\
-td.n{white-space:nowrap}td small{display:block;color:var(--soft)}svg text.label{font-size:26px;fill:var(--mark);font-weight:600}\
-thead th{color:var(--soft);font-weight:600}td.n{font-variant-numeric:tabular-nums}\
+th,td{text-align:left;padding:6px 8px;border-bottom:1px solid var(--line);vertical-align:top}\
+thead th{color:var(--soft);font-weight:600;font-size:13px;line-height:1.3;border-bottom:1px solid var(--soft)}\
+td.n{white-space:nowrap;font-variant-numeric:tabular-nums}\
+.lesions tbody th{color:var(--mark)}.span{display:block;color:var(--soft);font-size:12.5px}\
+.note{color:var(--soft);font-size:13px;margin:6px 0 0}\
 .conditions th{width:190px;font-weight:600;color:var(--soft)}.conditions td{overflow-wrap:anywhere}\
-figure{margin:8px 0}img,svg{max-width:100%;height:auto;display:block}figcaption{color:var(--soft);font-size:13px}\
-.bscans{display:grid;grid-template-columns:repeat(auto-fit,minmax(250px,1fr));gap:14px}\
-svg text{font-size:12px;fill:var(--soft)}svg .grid{stroke:var(--line)}svg .mark{stroke:var(--mark);stroke-dasharray:4 3}\
-svg text.mark{stroke:none;fill:var(--mark);font-weight:600}svg .area{fill:none;stroke:var(--blood);stroke-width:2}\
-footer{margin-top:28px;color:var(--soft);font-size:13px}\
-@media print{body{background:#fff}main{padding:0}}";
+figure{margin:8px 0}img,svg{max-width:100%;width:100%;height:auto;display:block}figcaption{color:var(--soft);font-size:13px;margin-top:6px}\
+.bscans{display:grid;grid-template-columns:repeat(auto-fit,minmax(260px,1fr));gap:16px}.bscans img{border-radius:2px}\
+footer{margin-top:30px;padding-top:12px;border-top:1px solid var(--line);color:var(--soft);font-size:13px}\
+@media(max-width:700px){main{margin:0;padding:20px}table{display:block;overflow-x:auto}}\
+@media print{body{background:#fff}main{margin:0;padding:0;box-shadow:none;max-width:none}h2,figure,tr{break-inside:avoid}}";
 
 #[cfg(test)]
 mod tests {

@@ -1,10 +1,14 @@
 //! Pictures inside the report: PNG as a data URI, so that one file holds everything.
 
+mod lettering;
 mod letters;
+mod paint;
 mod shapes;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+
+pub use lettering::{Anchor, width};
 
 /// An RGB picture under construction, origin at the top left.
 #[derive(Clone, Debug)]
@@ -40,6 +44,13 @@ impl Picture {
     /// Rows.
     pub const fn height(&self) -> usize {
         self.height
+    }
+
+    /// The colour of a pixel; black outside.
+    #[cfg(test)]
+    pub(crate) fn pixel(&self, column: usize, row: usize) -> Colour {
+        let at = 3 * (row * self.width + column);
+        self.rgb.get(at..at + 3).and_then(|rgb| rgb.try_into().ok()).unwrap_or_default()
     }
 
     /// Whether any pixel has this colour.
@@ -87,6 +98,11 @@ impl Picture {
     /// # Errors
     /// As [`Self::png`].
     pub fn data_uri(&self) -> Result<String, png::EncodingError> {
-        Ok(format!("data:image/png;base64,{}", STANDARD.encode(self.png()?)))
+        Ok(address(&self.png()?))
     }
+}
+
+/// The bytes of a PNG as an address that a page can hold inside itself.
+pub fn address(png: &[u8]) -> String {
+    format!("data:image/png;base64,{}", STANDARD.encode(png))
 }
