@@ -1,5 +1,4 @@
 //! Signed distances as VTK has them.
-#![expect(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 use std::path::PathBuf;
 use std::process::Command;
