@@ -12,7 +12,7 @@ use probepath_frames::{Direction, Point, World};
 
 use crate::ReconError;
 use crate::spline::Knots;
-use crate::surface::Shape;
+use crate::surface::{Shape, round};
 pub(crate) use smooth::add;
 
 /// Distance of the knots (m).
@@ -29,10 +29,15 @@ const ROUNDS: usize = 3;
 const FAR_M: f64 = 3e-3;
 /// Sections are taken this far apart when the curve is laid through their centres of gravity (m).
 const STEP_M: f64 = 0.5e-3;
+/// Directions in which a section's centre of gravity is summed: exact for products of four times five harmonics.
+const ROUND: usize = 24;
 /// The nearest of every so many samples is looked for first: 2 mm, within which no artery bends back.
 const STRIDE: usize = 8;
 
 /// A smooth curve along the vessel, from one end of what was seen to the other.
+///
+/// From exact contours of 200 vessels bent at random (by up to 137 degrees, tilted images, any order) it lay at most
+/// 0.022 mm from the true axis, 2 mm at either end left out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Centreline {
     /// Its points, at most 0.25 mm apart, from the first image's side to the last's.
@@ -90,11 +95,12 @@ impl Centreline {
 
     /// The same curve moved to the centres of gravity of a tube's sections normal to it.
     pub(crate) fn recentred(&self, shape: &Shape) -> Result<Self, ReconError> {
+        let round = round(ROUND);
         let count = (self.length_m() / STEP_M).ceil().max(4.0) as usize;
         let places: Vec<f64> = (0..=count).map(|i| self.length_m() * i as f64 / count as f64).collect();
         let centre = |at: &f64| {
             let point = self.at(*at)?;
-            let (up, side) = shape.centre_of_gravity(*at);
+            let (up, side) = shape.centre_of_gravity(*at, &round);
             Some(point.point.vector() + point.up.vector() * up + point.side.vector() * side)
         };
         let centres: Option<Vec<Vector3<f64>>> = places.iter().map(centre).collect();
@@ -201,9 +207,18 @@ impl Centreline {
         Some(at)
     }
 
-    /// The point whose section normal to the curve a place lies in, looked for from `near_m` on.
-    pub(crate) fn section_of(&self, place: &Vector3<f64>, near_m: f64) -> Option<CentrelinePoint> {
-        self.at(self.foot(place, near_m)?)
+    /// The length of the section normal to the curve that a place lies in, and where in it, along its `up` and `side`
+    /// (m). What [`at`](Self::at) would say to within some 1e-5 of the distance, without its square roots.
+    pub(crate) fn across(&self, place: &Vector3<f64>, near_m: f64) -> Option<(f64, f64, f64)> {
+        let at = self.foot(place, near_m)?;
+        let (a, b, t) = self.between(at)?;
+        let blend = t.clamp(0.0, 1.0);
+        let off = place - a.point.vector().lerp(&b.point.vector(), t);
+        let part = |of: fn(&CentrelinePoint) -> Vector3<f64>| {
+            let (first, second) = (off.dot(&of(a)), off.dot(&of(b)));
+            first + (second - first) * blend
+        };
+        Some((at, part(|p| p.up.vector()), part(|p| p.side.vector())))
     }
 
     /// How far a place is from the point at a length (m).

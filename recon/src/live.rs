@@ -31,7 +31,7 @@ const SPEED_OVER: usize = 5;
 /// [`reconstruct_from`](crate::reconstruct_from), which uses every contour.
 ///
 /// Beside [`reconstruct_lumen`](crate::reconstruct_lumen) the lumens are found without the images to come: what the
-/// beam's thickness takes in from the other side of a stenosis is not known yet.
+/// beam's thickness takes in from the other side of a stenosis is not known yet. Branches are left to the whole.
 pub struct LiveLumen {
     settings: LumenSettings,
     finder: Box<dyn LumenFinder>,

@@ -11,11 +11,16 @@ mod tube;
 use probepath_frames::{Point, World};
 
 pub(crate) use samples::{Samples, coarse_samples, samples};
-pub(crate) use tube::{AROUND, SectionCovariance, Shape, Tube, harmonics_of};
+pub(crate) use tube::{AROUND, SectionCovariance, Shape, Tube, Way, harmonics_of, round};
 
 use crate::centreline::{Centreline, CentrelinePoint};
 
 /// The lumen's surface as a grid of points: `along` rows of `around` points each.
+///
+/// It is smooth, and a short stenosis comes out wider than it is. Measured on exact contours of bent vessels, with a
+/// stenosis of 75 % of the area in the form of a cosine, and images 0.3 to 1 mm apart, the least area is too large by (of
+/// itself; a quarter of that in points of percent area): 0.1 % for a length of 20 mm, 0.4 % for 15 mm, 0.7 % for 10 mm,
+/// 4 % for 8 mm, 22 % for 6 mm, 47 % for 5 mm. With images 3 mm apart it is 5 % for 10 mm and 15 % for 8 mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LumenSurface {
     /// Rows along the vessel.
@@ -41,8 +46,7 @@ pub(crate) fn grid(
 ) -> LumenSurface {
     let places = (0..along).map(|row| line.length_m() * row as f64 / (along - 1).max(1) as f64);
     let centres: Vec<CentrelinePoint> = places.filter_map(|at| line.at(at)).collect();
-    let angle = |k: usize| std::f64::consts::TAU * k as f64 / around as f64;
-    let round: Vec<(f64, f64)> = (0..around).map(|k| angle(k).sin_cos()).collect();
+    let round = round(around);
     let points = centres.iter().flat_map(|centre| tube.ring(centre, &round)).collect();
     LumenSurface {
         along: centres.len(),

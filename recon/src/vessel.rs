@@ -7,12 +7,12 @@ mod sweeps;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::centreline::Centreline;
-use crate::surface::{self, LumenSurface, Samples, Tube};
-use root::Root;
-
 pub(crate) use closed::surface as closed_surface;
 
+use root::Root;
+
+use crate::centreline::Centreline;
+use crate::surface::{self, LumenSurface, Samples, Tube};
 use crate::uncertainty::{self, AreaError, Shown};
 use crate::{Contour, LumenSettings, ReconError, ReconWarning, Section, Stenosis, section, stenosis};
 

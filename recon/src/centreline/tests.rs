@@ -35,8 +35,10 @@ fn a_place_is_in_the_section_normal_to_the_curve() {
     let line = Centreline::through(&centres).expect("long enough");
     let middle = line.at(0.05).expect("inside");
     let place = middle.point.vector() + middle.up.vector() * 0.004 + middle.side.vector() * 0.003;
-    let found = line.section_of(&place, 0.047).expect("found");
+    let found = line.at(line.foot(&place, 0.047).expect("found")).expect("inside");
     assert!((found.at_m - 0.05).abs() < 2e-6, "{}", found.at_m);
+    let (at, up, side) = line.across(&place, 0.047).expect("found");
+    assert!((at - found.at_m).abs() < 1e-12 && (up - 0.004).abs() < 1e-7 && (side - 0.003).abs() < 1e-7);
     assert!(middle.up.vector().dot(&middle.tangent.vector()).abs() < 1e-12);
 }
 

@@ -108,7 +108,7 @@ fn edges(outline: &[Flat]) -> impl Iterator<Item = (Flat, Flat)> + '_ {
 /// Length of a closed outline whose points lie at equal angles on a curve: each chord stands for its arc.
 pub(crate) fn length(outline: &[Flat]) -> f64 {
     let half = std::f64::consts::PI / outline.len().max(3) as f64;
-    let chords: f64 = edges(outline).map(|(a, b)| (b.0 - a.0).hypot(b.1 - a.1)).sum();
+    let chords: f64 = edges(outline).map(|(a, b)| squared(a, b).sqrt()).sum();
     chords * half / half.sin()
 }
 
@@ -116,14 +116,27 @@ pub(crate) fn length(outline: &[Flat]) -> f64 {
 /// between two of its corners (G. Toussaint, "Solving geometric problems with the rotating calipers", 1983).
 pub(crate) fn widths(outline: &[Flat]) -> (f64, f64) {
     let hull = hull(outline);
-    let across = |(a, b): (Flat, Flat)| {
-        let edge = (b.0 - a.0).hypot(b.1 - a.1);
-        hull.iter().map(|p| cross(a, b, *p).abs() / edge).fold(0.0, f64::max)
-    };
-    let least = edges(&hull).map(across).fold(f64::INFINITY, f64::min);
-    let apart = |a: &Flat| hull.iter().map(|b| (b.0 - a.0).hypot(b.1 - a.1)).fold(0.0, f64::max);
-    let largest = hull.iter().map(apart).fold(0.0, f64::max);
-    (least.min(largest), largest)
+    let corner = |k: usize| hull[k % hull.len()];
+    let (mut least, mut largest, mut far) = (f64::INFINITY, 0.0_f64, 1);
+    for (i, (a, b)) in edges(&hull).enumerate() {
+        // Going round, the corner farthest from an edge only goes on; those it passes are opposite to the edge's first.
+        far = far.max(i + 1);
+        while far < i + hull.len() && off(a, b, corner(far + 1)) > off(a, b, corner(far)) {
+            far += 1;
+            largest = largest.max(squared(a, corner(far)));
+        }
+        least = least.min(off(a, b, corner(far)) / squared(a, b).sqrt());
+        largest = largest.max(squared(a, corner(far))).max(squared(b, corner(far)));
+    }
+    (least.min(largest.sqrt()), largest.sqrt())
+}
+
+fn off(a: Flat, b: Flat, c: Flat) -> f64 {
+    cross(a, b, c).abs()
+}
+
+fn squared(a: Flat, b: Flat) -> f64 {
+    (b.0 - a.0) * (b.0 - a.0) + (b.1 - a.1) * (b.1 - a.1)
 }
 
 /// Twice the area of the triangle, positive when it turns left.
@@ -222,6 +235,31 @@ mod tests {
                 (0..2000).map(width).fold((f64::INFINITY, 0.0_f64), |(a, b), w| (a.min(w), b.max(w)));
             assert!(least <= low + 1e-12 && low - least < 1e-5, "{case}: {least} {low}");
             assert!(largest >= high - 1e-12 && largest - high < 1e-8, "{case}: {largest} {high}");
+        }
+    }
+
+    #[test]
+    fn going_round_finds_the_widths_that_all_pairs_of_corners_have() {
+        let mut dice = Dice(12);
+        for case in 0..2000 {
+            let around = 3 + case % 30;
+            let point = |k: usize, r: f64| {
+                let angle = std::f64::consts::TAU * k as f64 / around as f64;
+                (r * angle.cos(), r * angle.sin())
+            };
+            // Every third is regular: parallel edges, corners equally far.
+            let even = case % 3 == 0;
+            let outline: Vec<Flat> =
+                (0..around).map(|k| point(k, if even { 1.0 } else { 0.2 + dice.uniform() })).collect();
+            let corners = hull(&outline);
+            let far = |(a, b): (Flat, Flat)| {
+                corners.iter().map(|p| off(a, b, *p) / squared(a, b).sqrt()).fold(0.0, f64::max)
+            };
+            let least = edges(&corners).map(far).fold(f64::INFINITY, f64::min);
+            let pairs = outline.iter().flat_map(|a| outline.iter().map(|b| squared(*a, *b).sqrt()));
+            let largest = pairs.fold(0.0, f64::max);
+            let found = widths(&outline);
+            assert!((found.0 - least).abs() < 1e-12 && (found.1 - largest).abs() < 1e-12, "{case}");
         }
     }
 

@@ -1,6 +1,5 @@
 //! Contour points as the tube sees them: length along the centreline, direction around it, distance from it.
 
-use nalgebra::Vector3;
 use probepath_frames::{Point, World};
 
 use super::AROUND;
@@ -98,11 +97,8 @@ fn sd(contour: &Contour, k: usize) -> f64 {
 
 /// A point, and its place across the vessel.
 fn sample(line: &Centreline, place: &Point<World>, near: f64, sd: f64) -> Option<(Sample, (f64, f64))> {
-    let place: Vector3<f64> = place.vector();
-    let section = line.section_of(&place, near)?;
-    let off = place - section.point.vector();
-    let across = (off.dot(&section.up.vector()), off.dot(&section.side.vector()));
-    let r = across.0.hypot(across.1);
-    let turn = if r > 0.0 { (across.0 / r, across.1 / r) } else { (1.0, 0.0) };
-    Some((Sample { at: section.at_m, turn, r, weight: 1.0 / (sd * sd) }, across))
+    let (at, up, side) = line.across(&place.vector(), near)?;
+    let r = (up * up + side * side).sqrt();
+    let turn = if r > 0.0 { (up / r, side / r) } else { (1.0, 0.0) };
+    Some((Sample { at, turn, r, weight: 1.0 / (sd * sd) }, (up, side)))
 }

@@ -18,14 +18,13 @@ pub(crate) const AROUND: usize = 2 * HARMONICS + 1;
 pub(crate) const SPAN: usize = 4 * AROUND - 1;
 /// Distance of the knots along (m).
 const KNOT_M: f64 = 2e-3;
-/// How sharply radii bend along the vessel (1/m), and over which length (m).
-pub(super) const BEND: f64 = 80.0;
+/// How sharply radii bend along the vessel (1/m), and over which length (m). Stiffer keeps more speckle out and widens
+/// short stenoses: with 80 a stenosis of 10 mm came out 2.0 % too wide instead of 0.4 %, and single areas scattered by
+/// 1.93 % instead of 2.04 %.
+pub(super) const BEND: f64 = 120.0;
 pub(super) const BEND_M: f64 = 5e-3;
 /// No lumen is drawn narrower (m).
 const LEAST_RADIUS_M: f64 = 0.05e-3;
-
-/// Angles at which a section's centre of gravity is summed: exact for products of four times five harmonics.
-const ANGLES: usize = 24;
 
 /// The distance of the border from the centreline, as a function of length and angle.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,7 +58,7 @@ impl Shape {
 
     /// Distance from the centreline at a length, in the direction of a cosine and sine (m).
     pub(crate) fn radius(&self, at: f64, turn: (f64, f64)) -> f64 {
-        radius(&self.section(at), turn)
+        Way::of(turn).radius(&self.section(at))
     }
 
     /// Area of the section at a length (m2): the integral of half the distance's square.
@@ -70,12 +69,11 @@ impl Shape {
     }
 
     /// The centre of gravity of the section at a length, along its `up` and `side` (m).
-    pub(crate) fn centre_of_gravity(&self, at: f64) -> (f64, f64) {
+    pub(crate) fn centre_of_gravity(&self, at: f64, round: &[Way]) -> (f64, f64) {
         let section = self.section(at);
         let (mut area, mut up, mut side) = (0.0, 0.0, 0.0);
-        for k in 0..ANGLES {
-            let (sin, cos) = (std::f64::consts::TAU * k as f64 / ANGLES as f64).sin_cos();
-            let r = radius(&section, (cos, sin));
+        for way in round {
+            let (r, (cos, sin)) = (way.radius(&section), way.turn);
             area += r * r / 2.0;
             up += r * r * r * cos / 3.0;
             side += r * r * r * sin / 3.0;
@@ -84,10 +82,31 @@ impl Shape {
     }
 }
 
-/// The distance in one direction (m).
-fn radius(section: &[f64; AROUND], turn: (f64, f64)) -> f64 {
-    let sum: f64 = section.iter().zip(harmonics_of(turn)).map(|(a, b)| a * b).sum();
-    sum.max(LEAST_RADIUS_M)
+/// A direction round the vessel.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Way {
+    /// Cosine and sine.
+    pub turn: (f64, f64),
+    harmonics: [f64; AROUND],
+}
+
+impl Way {
+    /// From its cosine and sine.
+    pub(crate) fn of(turn: (f64, f64)) -> Self {
+        Self { turn, harmonics: harmonics_of(turn) }
+    }
+
+    /// The distance of a section's border (m).
+    fn radius(&self, section: &[f64; AROUND]) -> f64 {
+        let sum: f64 = section.iter().zip(&self.harmonics).map(|(a, b)| a * b).sum();
+        sum.max(LEAST_RADIUS_M)
+    }
+}
+
+/// So many directions round the vessel, evenly.
+pub(crate) fn round(count: usize) -> Vec<Way> {
+    let angle = |k: usize| std::f64::consts::TAU * k as f64 / count as f64;
+    (0..count).map(|k| Way::of((angle(k).cos(), angle(k).sin()))).collect()
 }
 
 impl Tube {
@@ -142,21 +161,20 @@ impl Tube {
         (self.shape.area(at), slope.dot(&(self.covariance(at) * slope)).max(0.0).sqrt())
     }
 
-    /// The points of the surface round a point of the centreline, at angles given by sine and cosine.
-    pub(crate) fn ring(&self, centre: &CentrelinePoint, angles: &[(f64, f64)]) -> Vec<Point<World>> {
+    /// The points of the surface round a point of the centreline.
+    pub(crate) fn ring(&self, centre: &CentrelinePoint, round: &[Way]) -> Vec<Point<World>> {
         let section = self.section(centre.at_m);
-        let point = |&(sin, cos): &(f64, f64)| {
-            let r = radius(&section, (cos, sin));
-            centre.point.moved(centre.up, r * cos).moved(centre.side, r * sin)
+        let (middle, up, side) = (centre.point.vector(), centre.up.vector(), centre.side.vector());
+        let point = |way: &Way| {
+            let r = way.radius(&section);
+            Point::from_vector(middle + up * (r * way.turn.0) + side * (r * way.turn.1))
         };
-        angles.iter().map(point).collect()
+        round.iter().map(point).collect()
     }
-}
 
-impl Tube {
     /// Standard deviation of the distance in a direction, from the section's covariance and what all images share (m).
-    pub(crate) fn sd(&self, covariance: &SectionCovariance, turn: (f64, f64)) -> f64 {
-        let round = SVector::from(harmonics_of(turn));
+    pub(crate) fn sd(&self, covariance: &SectionCovariance, way: &Way) -> f64 {
+        let round = SVector::from(way.harmonics);
         round.dot(&(covariance * round)).max(0.0).sqrt().hypot(self.common_sd_m)
     }
 }

@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 use super::Vessel;
 use crate::Mesh;
 use crate::centreline::CentrelinePoint;
+use crate::surface::{Way, round};
 use solid::Solid;
 
 /// Distance of the rings (m), and points in each.
@@ -50,22 +51,21 @@ fn tube(vessel: &Vessel) -> Mesh {
     let rows = (line.length_m() / RING_M).ceil().max(1.0) as usize + 1;
     let at = |row: usize| line.length_m() * row as f64 / (rows - 1) as f64;
     let centres: Vec<CentrelinePoint> = (0..rows).filter_map(|row| line.at(at(row))).collect();
-    let angles: Vec<(f64, f64)> =
-        (0..RING).map(|k| (std::f64::consts::TAU * k as f64 / RING as f64).sin_cos()).collect();
+    let round = round(RING);
     let mut points = Vec::with_capacity(rows * RING);
     let mut scalars = Scalars::default();
     let mut caps = [(0.0, 0.0, 0.0); 2];
     for (row, centre) in centres.iter().enumerate() {
         let area = tube.shape().area(centre.at_m);
         let seen = vessel.is_measured(centre.at_m);
-        let ring = tube.ring(centre, &angles);
+        let ring = tube.ring(centre, &round);
         let covariance = tube.covariance(centre.at_m);
-        for (point, (sin, cos)) in ring.iter().zip(&angles) {
+        for (point, way) in ring.iter().zip(&round) {
             let r = point.distance(&centre.point);
-            let sd = tube.sd(&covariance, (*cos, *sin));
+            let sd = tube.sd(&covariance, way);
             if seen { scalars.push(area, r, sd) } else { scalars.push(f64::NAN, r, f64::NAN) }
         }
-        let mean_sd = tube.sd(&covariance, (0.0, 0.0));
+        let mean_sd = tube.sd(&covariance, &Way::of((0.0, 0.0)));
         caps[usize::from(row > 0)] = (area, (area / std::f64::consts::PI).sqrt(), mean_sd);
         points.extend(ring);
     }

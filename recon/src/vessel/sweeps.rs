@@ -54,17 +54,46 @@ struct Sweep<'a> {
 fn sweeps(samples: &[Samples]) -> Vec<Sweep<'_>> {
     let mut ordered: Vec<&Samples> = samples.iter().collect();
     ordered.sort_by_key(|contour| contour.turn);
-    let mut sweeps = Vec::new();
-    let mut run: Vec<&Samples> = Vec::new();
+    let (mut sweeps, mut run) = (Vec::new(), Run::default());
     for contour in ordered {
-        if let Some(turned) = turn(&run, contour.at) {
-            let rest = run.split_off(turned);
-            sweeps.push(std::mem::replace(&mut run, rest));
+        if let Some(turned) = run.turned(contour.at) {
+            let rest = run.contours.split_off(turned);
+            sweeps.push(std::mem::take(&mut run).contours);
+            rest.into_iter().for_each(|contour| run.push(contour));
         }
         run.push(contour);
     }
-    sweeps.push(run);
+    sweeps.push(run.contours);
     sweeps.into_iter().filter_map(Sweep::of).collect()
+}
+
+/// Contours in the order of their images, and which of them lie farthest along either way.
+#[derive(Default)]
+struct Run<'a> {
+    contours: Vec<&'a Samples>,
+    low: Option<(usize, f64)>,
+    high: Option<(usize, f64)>,
+}
+
+impl<'a> Run<'a> {
+    fn push(&mut self, contour: &'a Samples) {
+        let here = (self.contours.len(), contour.at);
+        if self.low.is_none_or(|low| contour.at <= low.1) {
+            self.low = Some(here);
+        }
+        if self.high.is_none_or(|high| contour.at >= high.1) {
+            self.high = Some(here);
+        }
+        self.contours.push(contour);
+    }
+
+    /// Where the sweep turned, when a further contour at `at` shows that it did.
+    fn turned(&self, at: f64) -> Option<usize> {
+        let (low, high) = (self.low?, self.high?);
+        // The later extreme is where it came to.
+        let (end, back) = if high.0 > low.0 { (high.0, high.1 - at) } else { (low.0, at - low.1) };
+        (high.1 - low.1 >= BACK_M && back > BACK_M).then_some(end + 1)
+    }
 }
 
 impl<'a> Sweep<'a> {
@@ -74,24 +103,6 @@ impl<'a> Sweep<'a> {
         let to = contours.iter().map(|contour| contour.at).fold(f64::NEG_INFINITY, f64::max);
         (contours.len() >= LEAST && to - from >= LEAST_M).then_some(Self { from, to, contours })
     }
-}
-
-/// Where in a run the sweep turned, when a further contour at `at` shows that it did.
-fn turn(run: &[&Samples], at: f64) -> Option<usize> {
-    let first = run.first()?.at;
-    let (mut low, mut high) = ((0, first), (0, first));
-    for (i, contour) in run.iter().enumerate() {
-        if contour.at <= low.1 {
-            low = (i, contour.at);
-        }
-        if contour.at >= high.1 {
-            high = (i, contour.at);
-        }
-    }
-    // The later extreme is where it came to.
-    let (end, forward) = if high.0 > low.0 { (high, true) } else { (low, false) };
-    let back = if forward { end.1 - at } else { at - end.1 };
-    (high.1 - low.1 >= BACK_M && back > BACK_M).then_some(end.0 + 1)
 }
 
 /// By how much a sweep lies off the surface of all, over a stretch.

@@ -44,7 +44,6 @@ fn off_axis(line: &Centreline, vessel: &BentVessel) -> Vec<f64> {
 #[test]
 fn the_axis_of_vessels_bent_at_random_is_found_from_oblique_uneven_cuts_in_any_order() {
     let mut dice = Dice(21);
-    let mut worst: f64 = 0.0;
     for case in 0..200 {
         let turn = 2.4 * dice.uniform();
         let mut vessel =
@@ -54,11 +53,26 @@ fn the_axis_of_vessels_bent_at_random_is_found_from_oblique_uneven_cuts_in_any_o
         let found = fitted(&exact(&vessel, &cuts)).expect("a vessel");
         let off = off_axis(&found.centreline, &vessel);
         let largest = off.iter().copied().fold(0.0, f64::max);
-        worst = worst.max(largest);
         assert!(largest < 0.05e-3, "{case}: {:.4} mm, turn {turn}", largest * 1e3);
         assert!((found.centreline.length_m() - vessel.length).abs() < 2e-3, "{case}");
     }
-    eprintln!("worst {:.4} mm", worst * 1e3);
+}
+
+#[test]
+fn poses_and_borders_that_scatter_leave_the_axis_within_a_tenth_of_a_millimetre() {
+    let mut dice = Dice(23);
+    for case in 0..30 {
+        let vessel = BentVessel::new(0.1, 3.5e-3, 2.0 * dice.uniform(), &mut dice);
+        let mut cuts = cuts(&vessel, 0.5e-3, &mut dice);
+        for cut in &mut cuts {
+            let ((a, b), (c, _)) = (dice.normal_pair(), dice.normal_pair());
+            cut.off = Vector3::new(a, b, c) * 0.2e-3;
+        }
+        let noisy = cuts.iter().map(|cut| vessel.contour(*cut, 32, |_| 0.15e-3 * dice.normal_pair().0));
+        let off = off_axis(&fitted(&noisy.collect::<Vec<_>>()).expect("a vessel").centreline, &vessel);
+        let mean = off.iter().sum::<f64>() / off.len() as f64;
+        assert!(mean < 0.1e-3, "{case}: {:.3} mm", mean * 1e3);
+    }
 }
 
 #[test]
@@ -162,7 +176,7 @@ fn bias_percent(length: f64, spacing: f64, noise: f64) -> f64 {
 #[test]
 fn smoothing_widens_a_stenosis_by_no_more_than_the_surface_says() {
     // Length, spacing, the error of single contours (mm); the bound on the area (%).
-    let bounds = [(8.0, 0.5, 0.0, 9.0), (10.0, 1.0, 0.0, 3.0), (15.0, 2.0, 0.0, 1.0), (20.0, 0.5, 0.05, 1.0)];
+    let bounds = [(8.0, 0.5, 0.0, 6.0), (10.0, 1.0, 0.0, 1.5), (15.0, 2.0, 0.0, 1.0), (20.0, 0.5, 0.05, 1.0)];
     for (length, spacing, noise, bound) in bounds {
         let bias = bias_percent(length * 1e-3, spacing * 1e-3, noise * 1e-3);
         assert!(bias.abs() < bound, "{length} mm, an image each {spacing} mm: {bias:+.2} %");

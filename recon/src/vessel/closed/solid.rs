@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::super::Vessel;
 use crate::centreline::Centreline;
-use crate::surface::SectionCovariance;
+use crate::surface::{SectionCovariance, Way};
 
 /// Seeds are this far apart along the vessel (m): a narrow place must not hide what lies beyond it.
 const SEED_M: f64 = 5e-3;
@@ -85,7 +85,7 @@ impl<'a> Solid<'a> {
             return (none, r, none);
         }
         let covariance = self.covariances.get((seen.at / STEP_M).round() as usize);
-        let sd = covariance.map_or(none, |covariance| self.vessel.tube.sd(covariance, seen.turn));
+        let sd = covariance.map_or(none, |covariance| self.vessel.tube.sd(covariance, &Way::of(seen.turn)));
         (self.vessel.tube.shape().area(seen.at), r, sd)
     }
 }
