@@ -95,11 +95,14 @@ pub struct Reconstruct {
 /// `compare`
 #[derive(Args, Debug)]
 pub struct Compare {
-    /// The surface (.stl, .ply, .vtp), mm.
+    /// The surface (.stl, .ply, .vtp), mm; with --follow-up the earlier exam (.mcap) or its sections (.csv).
     pub surface: PathBuf,
     /// The gold standard (.stl, .ply, .vtp), mm.
-    #[arg(long, value_name = "SURFACE")]
-    pub gold: PathBuf,
+    #[arg(long, value_name = "SURFACE", required_unless_present = "follow_up")]
+    pub gold: Option<PathBuf>,
+    /// A later exam (.mcap) of the same leg, or its sections (.csv): what changed, and whether more than the errors.
+    #[arg(long, value_name = "LATER", conflicts_with_all = ["gold", "fit", "in_place", "gold_unit", "out"])]
+    pub follow_up: Option<PathBuf>,
     /// How the surface is laid on the gold standard first.
     #[arg(long, value_enum, default_value_t = FitOf::Rigid)]
     pub fit: FitOf,

@@ -22,7 +22,10 @@ pub fn perform(command: Command, screen: &Screen) -> Outcome {
         Command::Scan(args) => return scan(args, screen),
         Command::Calibrate(which) => return calibrate::perform(which, screen),
         Command::Reconstruct(args) => return reconstruct(args, screen),
-        Command::Compare(args) => Document::of(&offline::compare(&compared(args))?),
+        Command::Compare(args) => match &args.follow_up {
+            Some(later) => Document::of(&offline::followed_up(&args.surface, later)?),
+            None => Document::of(&offline::compare(&compared(args))?),
+        },
         Command::Convert(args) => {
             Document::of(&offline::convert(&args.input, &args.output, args.no_burned_in)?)
         }
@@ -34,7 +37,9 @@ pub fn perform(command: Command, screen: &Screen) -> Outcome {
 }
 
 fn compared(args: crate::cli::Compare) -> offline::CompareWish {
-    let crate::cli::Compare { surface, gold, fit, in_place, gold_unit, out } = args;
+    let crate::cli::Compare { surface, gold, fit, in_place, gold_unit, out, .. } = args;
+    // The command line asks for one of gold and follow_up.
+    let gold = gold.unwrap_or_default();
     let fit = match fit {
         _ if in_place => offline::Fit::None,
         FitOf::Rigid => offline::Fit::Rigid,

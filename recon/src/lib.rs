@@ -27,6 +27,7 @@ mod centreline;
 mod compare;
 mod error;
 pub mod fast_marching;
+mod follow_up;
 mod live;
 mod lumen;
 pub mod measures;
@@ -55,6 +56,9 @@ pub use compare::{
     compare, unrolled,
 };
 pub use error::ReconError;
+pub use follow_up::{
+    AreaChange, ChangedStretch, FALSE_ALARM, FollowUp, FollowUpError, StenosisChange, follow_up,
+};
 pub use live::{AreaSoFar, LiveLumen, VesselSoFar, View};
 pub use lumen::{Contour, ImageLumen, LumenFinder, NoLumen, Tracker, segment};
 pub use mesh::{Mesh, MeshError, PointScalars};

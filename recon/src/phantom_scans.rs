@@ -11,7 +11,7 @@ use crate::{Contour, ErrorBudget, ImageLumen};
 /// Points of a contour.
 const POINTS: usize = 64;
 /// Noise of contours this far apart is hardly the same (mm).
-const SPECKLE_MM: f64 = 2.5;
+const SPECKLE_MM: f64 = 2.0;
 
 /// A vessel on an arc in the World's x-z plane. Lengths in mm.
 #[derive(Clone, Debug)]
@@ -45,12 +45,18 @@ impl Vessel {
         (Vector3::new((1.0 - cos) / k, 0.0, sin / k), Vector3::new(sin, 0.0, cos))
     }
 
-    /// How far a point is outside the lumen, looked for from `s` on.
-    fn outside(&self, point: &Vector3<f64>, mut s: f64) -> f64 {
+    /// Where along the axis a point is (mm), looked for from `s` on.
+    pub(crate) fn nearest(&self, point: &Vector3<f64>, mut s: f64) -> f64 {
         for _ in 0..4 {
             let (centre, along) = self.axis(s);
             s += (point - centre).dot(&along);
         }
+        s
+    }
+
+    /// How far a point is outside the lumen, looked for from `s` on.
+    fn outside(&self, point: &Vector3<f64>, s: f64) -> f64 {
+        let s = self.nearest(point, s);
         (point - self.axis(s).0).norm() - self.radius_at(s)
     }
 }

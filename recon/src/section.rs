@@ -143,7 +143,7 @@ fn section(Cut { centre, radii }: &Cut, tube: &Tube, missing: Option<NotMeasured
         normal: centre.tangent,
         middle: if missing.is_none() { middle } else { centre.point },
         force_n: None,
-        measure: missing.is_none().then(|| measure(radii, area, tube.radius_sd(centre.at_m))),
+        measure: missing.is_none().then(|| measure(radii, area, tube.area(centre.at_m).1)),
         missing,
     }
 }
@@ -160,12 +160,12 @@ fn area_and_middle(radii: &[f64; OUTLINE]) -> (f64, Flat) {
     (area, (moment.0 / area, moment.1 / area))
 }
 
-fn measure(radii: &[f64; OUTLINE], area: f64, radius_sd: f64) -> SectionMeasure {
+fn measure(radii: &[f64; OUTLINE], area: f64, area_sd: f64) -> SectionMeasure {
     let outline: Vec<Flat> = radii.iter().zip(turns()).map(|(r, (cos, sin))| (r * cos, r * sin)).collect();
     let (least, largest) = outline::widths(&outline);
     let (_, inscribed) = outline::inscribed_circle(&outline, (0.0, 0.0));
     let mean = (area / std::f64::consts::PI).sqrt();
-    let (area_mm2, sd_mm2) = (area * 1e6, std::f64::consts::TAU * mean * radius_sd * 1e6);
+    let area_mm2 = area * 1e6;
     let measure = SectionMeasure {
         area_mm2,
         area_sd_mm2: 0.0,
@@ -177,7 +177,7 @@ fn measure(radii: &[f64; OUTLINE], area: f64, radius_sd: f64) -> SectionMeasure 
         largest_diameter_mm: largest * 1e3,
         circularity: (4.0 * std::f64::consts::PI * area / outline::length(&outline).powi(2)).min(1.0),
     };
-    measure.with_sd(sd_mm2, 0.0)
+    measure.with_sd(area_sd * 1e6, 0.0)
 }
 
 /// Distances of the outline's points from the centreline.

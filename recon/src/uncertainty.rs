@@ -42,6 +42,13 @@ impl AreaError {
         Self::random(section.measure.as_ref().map_or(0.0, |measure| measure.area_sd_mm2))
     }
 
+    /// All that a section states: what its scan shares as one cause.
+    pub(crate) fn stated(section: &Section) -> Self {
+        let mut error = Self::of(section);
+        error.common_mm2[0] = section.measure.as_ref().map_or(0.0, |measure| measure.area_common_sd_mm2);
+        error
+    }
+
     /// Only random errors.
     pub(crate) const fn random(sd_mm2: f64) -> Self {
         Self { random_mm2: sd_mm2, common_mm2: [0.0; COMMON], moved_mm: [0.0; COMMON] }
@@ -151,8 +158,9 @@ impl<'a> Near<'a> {
         let perimeter_mm = std::f64::consts::PI * measure.equivalent_diameter_mm;
         let mut error = AreaError::random(measure.area_sd_mm2);
         for k in 0..PARAMETERS {
-            error.common_mm2[k] = measure.area_mm2 * relative[k];
             error.moved_mm[k] = 1e3 * moved[k];
+            // What is measured here belongs to where it truly was.
+            error.common_mm2[k] = measure.area_mm2 * relative[k] - slope * error.moved_mm[k];
         }
         error.common_mm2[PARAMETERS] = perimeter_mm * 1e3 * border_m.hypot(budget.border_sd_m);
         // Poses noisy along the vessel show another place's area; poses noisy in angle show a cut more or less oblique.

@@ -7,12 +7,14 @@ mod arm;
 pub mod calibrate;
 mod compare;
 mod convert;
+mod follow_up;
 mod reconstruct;
 mod simulate;
 
 pub use arm::{ArmAnswer, ArmError, ArmQuestion, arm};
 pub use compare::{CompareError, CompareWish, Comparison, Fit, compare};
 pub use convert::{ConvertError, Converted, convert};
+pub use follow_up::{FollowedUp, FollowedUpError, followed_up};
 pub use reconstruct::{
     FinderFault, FinderWish, ImagesOf, ReconstructError, ReconstructWish, Reconstructed, Timing, VolumeMade,
     reconstruct,

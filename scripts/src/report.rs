@@ -180,12 +180,23 @@ pub struct SegmentRow {
     pub from_mm: f64,
     /// Where it ends (mm).
     pub until_mm: f64,
+    /// How much of it was measured (mm).
+    pub measured_mm: f64,
     /// Mean lumen area (mm2).
     pub mean_area_mm2: f64,
+    /// Its 95 % interval (mm2).
+    pub mean_area_interval_mm2: [f64; 2],
     /// Smallest lumen area (mm2).
     pub min_area_mm2: f64,
+    /// Its 95 % interval (mm2).
+    pub min_area_interval_mm2: [f64; 2],
     /// Mean diameter of equal area (mm).
     pub mean_diameter_mm: f64,
+    /// Smallest diameter of equal area (mm).
+    pub min_diameter_mm: f64,
+    /// Mean contact force (N), where it was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mean_force_n: Option<f64>,
     /// The worst lesion, percent area; none without a lesion.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub worst_percent_area: Option<f64>,
@@ -201,6 +212,9 @@ pub struct AreaPoint {
     /// Its 95 % interval (mm2).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub area_interval_mm2: Option<[f64; 2]>,
+    /// Mean contact force of the images near it (N).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force_n: Option<f64>,
 }
 
 /// How the contact force was held, in N.

@@ -10,8 +10,8 @@ use crate::{LumenSettings, Section};
 
 /// A stenosis ends: beyond it the vessel is wide again, by at least this part of what it lost.
 const RECOVERY: f64 = 0.4;
-/// A narrowing of less than this is not measured at all (%).
-const HARDLY: f64 = 5.0;
+/// A narrowing of less than this (%), or of half of what is called a stenosis, is noise: normal segments may hold it.
+const HARDLY: f64 = 15.0;
 
 /// A narrowing, before it is measured.
 struct Narrowing {
@@ -22,7 +22,7 @@ struct Narrowing {
 /// The stenoses of at least the settings' percent area, along the vessel. `errors` says how sure each section is.
 pub(crate) fn find(sections: &[Section], errors: &[AreaError], settings: &LumenSettings) -> Vec<Stenosis> {
     let places = places(sections, errors);
-    let narrowings = narrowings(&places);
+    let narrowings = narrowings(&places, HARDLY.min(0.5 * settings.least_percent_area));
     let measured = narrowings.iter().enumerate().filter_map(|(own, narrowing)| {
         let others = || narrowings.iter().enumerate().filter(move |(k, _)| *k != own).map(|(_, other)| other);
         let normal = |at: f64| !others().any(|other| other.holds(&places, at));
@@ -45,7 +45,7 @@ fn is_one(stenosis: &Stenosis, least_percent_area: f64) -> bool {
 }
 
 /// Every stretch that is narrower than what lies beside it, the narrowest first; none inside another.
-fn narrowings(places: &[Place]) -> Vec<Narrowing> {
+fn narrowings(places: &[Place], hardly: f64) -> Vec<Narrowing> {
     let mut minima: Vec<usize> = (0..places.len()).filter(|&i| is_minimum(places, i)).collect();
     minima.sort_by(|&a, &b| places[a].smooth.total_cmp(&places[b].smooth));
     let mut found: Vec<Narrowing> = Vec::new();
@@ -55,7 +55,7 @@ fn narrowings(places: &[Place]) -> Vec<Narrowing> {
             continue;
         }
         let narrowing = Narrowing { narrowest, ends: shoulders(places, narrowest) };
-        if narrowing.depth(places) > HARDLY {
+        if narrowing.depth(places) > hardly {
             found.push(narrowing);
         }
     }

@@ -149,11 +149,6 @@ impl Tube {
         sum
     }
 
-    /// Standard deviation of the mean radius at a length (m).
-    pub(crate) fn radius_sd(&self, at: f64) -> f64 {
-        self.covariance(at)[(0, 0)].max(0.0).sqrt()
-    }
-
     /// Area of the section at a length and its standard deviation (m2).
     pub(crate) fn area(&self, at: f64) -> (f64, f64) {
         let mut slope = SVector::from(self.section(at)) * std::f64::consts::PI;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use probepath_frames::{Point, World};
-use probepath_recon::{LumenReconstruction, Mesh, MeshError, Section, Stenosis};
+use probepath_recon::{LumenReconstruction, Mesh, MeshError, Section, Stenosis, measures};
 use probepath_us_capture::PlacedBScan;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -151,7 +151,7 @@ fn numbers(from: &Ingredients<'_>, surfaces: &[PathBuf], page: &Path) -> Report 
         exam_of: from.heading.clone(),
         surface_error_mm: from.surface_error,
         stenoses: recon.stenoses.iter().enumerate().map(|(i, s)| stenosis_row(i, s, from)).collect(),
-        segments: from.segments.iter().filter_map(|s| segment_row(s, recon)).collect(),
+        segments: segment_rows(from.segments, recon),
         area_curve: area_points(recon),
         mean_force_n: mean_force_n(from, 0.0..f64::INFINITY),
         force_n: figures.force_n,
@@ -217,31 +217,33 @@ fn mean_force_n(from: &Ingredients<'_>, along_mm: std::ops::Range<f64>) -> Optio
     (!forces.is_empty()).then(|| forces.iter().sum::<f64>() / forces.len() as f64)
 }
 
-/// What was measured in a segment; none where nothing was.
-fn segment_row(segment: &Segment, recon: &LumenReconstruction) -> Option<SegmentRow> {
-    let (from, until) = (segment.from_m * 1e3, segment.until_m * 1e3);
-    let inside = |at: f64| (from..until).contains(&at);
-    let areas: Vec<f64> = recon
-        .sections
-        .iter()
-        .filter(|section| inside(section.at_mm))
-        .filter_map(|section| Some(section.measure.as_ref()?.area_mm2))
-        .collect();
-    if areas.is_empty() {
-        return None;
+/// What was measured in each segment; none where nothing was.
+fn segment_rows(segments: &[Segment], recon: &LumenReconstruction) -> Vec<SegmentRow> {
+    let named = |s: &Segment| measures::Segment {
+        name: s.name.clone(),
+        from_mm: s.from_m * 1e3,
+        until_mm: s.until_m * 1e3,
+    };
+    let named: Vec<measures::Segment> = segments.iter().map(named).collect();
+    let found = measures::segment_measures(&named, &recon.sections, &recon.stenoses);
+    found.into_iter().map(segment_row).collect()
+}
+
+fn segment_row(found: measures::SegmentMeasure) -> SegmentRow {
+    SegmentRow {
+        name: found.segment.name,
+        from_mm: found.segment.from_mm,
+        until_mm: found.segment.until_mm,
+        measured_mm: found.measured_mm,
+        mean_area_mm2: found.mean_area_mm2,
+        mean_area_interval_mm2: found.mean_area_interval_mm2,
+        min_area_mm2: found.min_area_mm2,
+        min_area_interval_mm2: found.min_area_interval_mm2,
+        mean_diameter_mm: found.mean_diameter_mm,
+        min_diameter_mm: found.min_diameter_mm,
+        mean_force_n: found.mean_force_n,
+        worst_percent_area: found.worst.map(|stenosis| stenosis.percent_area),
     }
-    let mean = areas.iter().sum::<f64>() / areas.len() as f64;
-    let diameters = areas.iter().map(|area| 2.0 * (area / std::f64::consts::PI).sqrt()).sum::<f64>();
-    let worst = recon.stenoses.iter().filter(|s| inside(s.at_mm)).map(|s| s.percent_area);
-    Some(SegmentRow {
-        name: segment.name.clone(),
-        from_mm: from,
-        until_mm: until.min(recon.centreline.length_m() * 1e3),
-        mean_area_mm2: mean,
-        min_area_mm2: areas.iter().copied().fold(f64::INFINITY, f64::min),
-        mean_diameter_mm: diameters / areas.len() as f64,
-        worst_percent_area: worst.reduce(f64::max),
-    })
 }
 
 pub(super) fn area_points(recon: &LumenReconstruction) -> Vec<AreaPoint> {
@@ -249,6 +251,7 @@ pub(super) fn area_points(recon: &LumenReconstruction) -> Vec<AreaPoint> {
         at_mm: section.at_mm,
         area_mm2: section.measure.as_ref().map(|m| m.area_mm2),
         area_interval_mm2: section.measure.as_ref().map(|m| m.area_interval_mm2),
+        force_n: section.force_n,
     };
     recon.sections.iter().map(point).collect()
 }

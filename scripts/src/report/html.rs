@@ -120,8 +120,12 @@ fn stenoses(body: &mut String, rows: &[StenosisRow]) {
     );
 }
 
+/// A 95 % interval, under its number.
+fn span([low, high]: [f64; 2]) -> String {
+    format!("<span class='span'>[{low:.1}, {high:.1}]</span>")
+}
+
 fn stenosis(body: &mut String, s: &StenosisRow) {
-    let span = |[low, high]: [f64; 2]| format!("<span class='span'>[{low:.1}, {high:.1}]</span>");
     let force = s.force_n.map_or_else(|| "not measured".into(), |force| format!("{force:.1} N"));
     let asymmetry = s.asymmetry.map_or_else(|| "not known".to_owned(), |part| format!("{part:.2}"));
     let cells = [
@@ -179,20 +183,23 @@ fn segments(body: &mut String, report: &Report) {
     }
     body.push_str(
         "<h2>Segments</h2><table><thead><tr><th>Segment</th><th>From</th><th>To</th><th>Mean area</th>\
-         <th>Mean diameter</th><th>Smallest area</th><th>Worst stenosis</th></tr></thead><tbody>",
+         <th>Mean diameter</th><th>Smallest area</th><th>Force</th><th>Worst stenosis</th></tr></thead><tbody>",
     );
     for s in &report.segments {
         let worst = s.worst_percent_area.map_or_else(|| "none".to_owned(), |p| format!("{p:.1} % of area"));
+        let force = s.mean_force_n.map_or_else(|| "not measured".to_owned(), |n| format!("{n:.1} N"));
         let _ = write!(
             body,
-            "<tr><th>{}</th><td class='n'>{:.0} mm</td><td class='n'>{:.0} mm</td><td class='n'>{:.1} mm²</td>\
-             <td class='n'>{:.2} mm</td><td class='n'>{:.1} mm²</td><td>{worst}</td></tr>",
+            "<tr><th>{}</th><td class='n'>{:.0} mm</td><td class='n'>{:.0} mm</td><td class='n'>{:.1} mm²{}</td>\
+             <td class='n'>{:.2} mm</td><td class='n'>{:.1} mm²{}</td><td class='n'>{force}</td><td>{worst}</td></tr>",
             escape(&s.name),
             s.from_mm,
             s.until_mm,
             s.mean_area_mm2,
+            span(s.mean_area_interval_mm2),
             s.mean_diameter_mm,
-            s.min_area_mm2
+            s.min_area_mm2,
+            span(s.min_area_interval_mm2)
         );
     }
     body.push_str("</tbody></table>");
