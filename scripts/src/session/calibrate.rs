@@ -144,9 +144,18 @@ impl Calibrated {
         }
     }
 
+    /// The Z-fiducials' error; a window of 2 cm may show no Z whole, and then every dot's distance from its wire.
+    fn error(&self) -> CalibrationError {
+        let (found, held_out) = (self.found(), self.held.is_some());
+        if found.mid_rms_mm.is_finite() {
+            return CalibrationError { rms_mm: found.mid_rms_mm, sd_mm: found.mid_sd95_mm, held_out };
+        }
+        let line = self.held.as_ref().unwrap_or(&self.spatial.evaluation).line;
+        CalibrationError { rms_mm: line.rms_m * 1e3, sd_mm: line.sd95_m * 1e3, held_out }
+    }
+
     /// As it is stored, for scanning tissue.
     pub fn stored(&self, date: Option<&str>) -> Calibration {
-        let found = self.found();
         let phantom = self.spatial.phantom().name.clone();
         let (depth, focus) = (self.setting.depth_m * 1e3, self.setting.focus_m * 1e3);
         Calibration {
@@ -156,11 +165,7 @@ impl Calibrated {
             probe_from_image: self.in_tissue(),
             setting: self.setting,
             image_lag: self.spatial.fit.lag,
-            error: CalibrationError {
-                rms_mm: found.mid_rms_mm,
-                sd_mm: found.mid_sd95_mm,
-                held_out: self.held.is_some(),
-            },
+            error: self.error(),
             quality: Some(self.quality()),
         }
     }

@@ -22,13 +22,13 @@ pub(super) fn gold(vessels: &[Vessel], main: Range<f64>) -> Mesh {
         let tube = Mesh::tube(&grid.points, (grid.along, grid.around));
         let others: Vec<&Vessel> =
             vessels.iter().enumerate().filter(|(other, _)| *other != number).map(|(_, v)| v).collect();
-        append(&mut joined, &tube, &others);
+        append(&mut joined, (&tube, grid.points.len()), &others);
     }
     joined
 }
 
-/// The triangles of a tube that no other vessel swallows.
-fn append(joined: &mut Mesh, tube: &Mesh, others: &[&Vessel]) {
+/// The triangles of a tube that no other vessel swallows, without its ends: points from `walls` on close those.
+fn append(joined: &mut Mesh, (tube, walls): (&Mesh, usize), others: &[&Vessel]) {
     let swallowed: Vec<bool> = tube
         .points
         .iter()
@@ -39,9 +39,12 @@ fn append(joined: &mut Mesh, tube: &Mesh, others: &[&Vessel]) {
         .collect();
     let first = joined.points.len() as u32;
     joined.points.extend(&tube.points);
-    let is_wall = |corner: &u32| !swallowed.get(*corner as usize).copied().unwrap_or(true);
-    let walls = tube.triangles.iter().filter(|corners| corners.iter().all(is_wall));
-    joined.triangles.extend(walls.map(|corners| corners.map(|corner| first + corner)));
+    let is_wall = |corner: &u32| {
+        let corner = *corner as usize;
+        corner < walls && !swallowed.get(corner).copied().unwrap_or(true)
+    };
+    let open = tube.triangles.iter().filter(|corners| corners.iter().all(is_wall));
+    joined.triangles.extend(open.map(|corners| corners.map(|corner| first + corner)));
 }
 
 #[cfg(test)]
