@@ -201,6 +201,12 @@ pub struct Simulate {
     /// Write the file with which this cell is scanned over the wire: `probepath scan --cell FILE`.
     #[arg(long, value_name = "FILE")]
     pub write_cell: Option<PathBuf>,
+    /// When it ends, write there what happened (JSON): ticks, packages, B-scans, how punctual it was.
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
+    /// End when standard input does, besides Ctrl-C: for whoever starts it from a program, and may be killed.
+    #[arg(long)]
+    pub until_input_ends: bool,
 }
 
 /// What makes a simulated cell's clock go.

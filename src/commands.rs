@@ -105,7 +105,10 @@ fn validated(args: &crate::cli::Validate, screen: &Screen) -> Outcome {
             Document::of(&validate::speed(args.setting.as_deref(), &std::env::current_exe()?, &*progress)?)
         }
         Goal::Force => Document::of(&validate::force(seeds, &*progress)?),
-        Goal::Soak => Document::of(&validate::soak(&validate::SoakWish::wall(args.minutes), &*progress)?),
+        Goal::Soak => {
+            let wish = validate::SoakWish::wall(std::env::current_exe()?, args.minutes);
+            Document::of(&validate::soak(&wish, &*progress)?)
+        }
         Goal::Motion => Document::of(&validate::motion(seeds, &*progress)?),
         Goal::Safety => Document::of(&validate::safety(seeds, &std::env::current_exe()?, &*progress)?),
     }?)

@@ -13,7 +13,8 @@ fn a_short_soak_loses_nothing() {
     let mut cell = CellConfig::default();
     cell.hand.length_mm = 40.0;
     let host = IpAddr::V4(Ipv4Addr::new(127, 22, part(process / 250), part(process)));
-    let goals = soak(&SoakWish { seconds: 5.0, time: Time::Simulated, host, cell }, &()).unwrap();
+    let probepath = env!("CARGO_BIN_EXE_probepath").into();
+    let goals = soak(&SoakWish { probepath, seconds: 5.0, time: Time::Simulated, host, cell }, &()).unwrap();
     assert!(goals.reached, "{goals}");
     let of = |figure: &str| goals.rows.iter().find(|row| row.figure == figure).unwrap().mean;
     assert!(of("ticks in the exam") > 2000.0, "{goals}");

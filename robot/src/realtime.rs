@@ -26,7 +26,7 @@ mod timings;
 mod tests;
 
 pub use apart::{Apart, run_apart};
-pub use grant::{Grant, RealtimeReport, be_realtime};
+pub use grant::{Grant, Rank, RealtimeReport, be_realtime, take_rank};
 pub use histogram::{Figures, Histogram};
 pub use thread::{ControlThreadError, control_thread};
 pub use timings::{Clock, Monotonic, Timed, TimingFigures, Timings};

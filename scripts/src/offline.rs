@@ -19,4 +19,4 @@ pub use reconstruct::{
     FinderFault, FinderWish, ImagesOf, ReconstructError, ReconstructWish, Reconstructed, Timing, VolumeMade,
     reconstruct,
 };
-pub use simulate::{Served, ServedArm, SimulateError, SimulateRequest, Simulating, simulate};
+pub use simulate::{Served, ServedArm, ServedPort, SimulateError, SimulateRequest, Simulating, simulate};

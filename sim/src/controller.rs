@@ -44,7 +44,10 @@ pub use core::Counters;
 pub use error::ControllerError;
 pub use program::{Script, recognise};
 
+use probepath_robot::realtime::Grant;
+
 use self::core::Controller;
+pub use self::serve::Punctuality;
 use self::serve::Server;
 use crate::cell::SimulatedCell;
 
@@ -120,6 +123,16 @@ impl Running {
     /// What happened so far.
     pub fn counters(&self) -> Counters {
         self.server.world().controller.counters.clone()
+    }
+
+    /// How late it was itself so far, by the wall's clock.
+    pub fn punctuality(&self) -> Punctuality {
+        self.server.punctuality().clone()
+    }
+
+    /// Whether the system lets its ticks run before all other work of this computer; not asked for in simulated time.
+    pub fn scheduling(&self) -> Grant {
+        self.server.scheduling()
     }
 
     /// Why the last program ended; empty before one did.

@@ -24,8 +24,10 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use probepath_frames::{Span, Stamp};
+use probepath_robot::realtime::{Rank, take_rank};
 use probepath_us_capture::igtl::{IgtlError, Image, PORT, encode_image, encode_status};
 use probepath_us_capture::{BScan, BScanSource, SourceFault};
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::cell::SimulatedCell;
@@ -74,7 +76,7 @@ pub enum MachineServerError {
 pub struct MachineServer;
 
 /// How many pictures left, and how many were too old to.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sent {
     /// Connections that were accepted.
     pub clients: u64,
@@ -231,6 +233,11 @@ enum Left {
 impl Client {
     /// Tick by tick, until the client or the machine is gone.
     fn serve(mut self) {
+        if self.shared.config.time == Time::Wall {
+            // The threads that draw are started before, lest they rank with this one.
+            let _ = rayon::current_num_threads();
+            let _ = take_rank(Rank::Device);
+        }
         let mut served = Stamp::from_nanoseconds(i64::MIN);
         while !self.shared.is_stopping() {
             let now = self.shared.cell.shared().wait_beyond(served, LOOK);

@@ -144,10 +144,11 @@ impl SimulatedMachine {
                 break;
             }
             let pose = scene.leg_from_probe(self.formed_at(shows)).filter(|_| self.arrives(number));
-            let contact = pose.and_then(|pose| scene.touched(&pose));
+            let around = scene.surroundings();
             drop(scene);
             self.next += 1;
             let Some(world_from_probe) = pose else { continue };
+            let contact = around.touched(&world_from_probe);
             let world_from_image = world_from_probe * self.truth.probe_from_image(&self.setting);
             let (arrived, contact) = (self.arrival(number), self.contact(contact));
             formed.push(Formed { number, arrived, shows, world_from_image, contact });

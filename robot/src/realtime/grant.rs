@@ -8,8 +8,29 @@ use thread_priority::{
     set_thread_priority_and_policy, thread_native_id,
 };
 
-/// Above the kernel's own threads for interrupts (50), below its watchdogs (99).
-const PRIORITY: u8 = 80;
+/// What a thread that must be punctual stands for. All run before whatever is not real time (SCHED_FIFO).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
+pub enum Rank {
+    /// A device that is emulated on this computer, and sends something now and then: an ultrasound machine.
+    Device,
+    /// The loop that moves an arm.
+    Control,
+    /// An arm's controller that is emulated on this computer. In truth it is a machine of its own, whose ticks wait
+    /// for nothing that happens here.
+    Controller,
+}
+
+impl Rank {
+    /// The kernel's own threads for interrupts have 50, its watchdogs 99.
+    const fn priority(self) -> u8 {
+        match self {
+            Self::Device => 40,
+            Self::Control => 80,
+            Self::Controller => 85,
+        }
+    }
+}
 
 /// What the system gave of one wish, in words.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -73,17 +94,20 @@ impl fmt::Display for RealtimeReport {
 ///
 /// A thread that was given SCHED_FIFO passes it on to the threads it starts: start none from it.
 pub fn be_realtime() -> RealtimeReport {
-    RealtimeReport { scheduling: scheduling(), memory: memory() }
+    RealtimeReport { scheduling: take_rank(Rank::Control), memory: memory() }
 }
 
-fn scheduling() -> Grant {
-    let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
+/// Asks that the calling thread runs before all that rank lower (SCHED_FIFO). The threads that it starts from now on
+/// do so too.
+pub fn take_rank(rank: Rank) -> Grant {
+    let (policy, priority) =
+        (ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo), rank.priority());
     let asked =
-        ThreadPriorityValue::try_from(PRIORITY).map(ThreadPriority::Crossplatform).and_then(|priority| {
+        ThreadPriorityValue::try_from(priority).map(ThreadPriority::Crossplatform).and_then(|priority| {
             set_thread_priority_and_policy(thread_native_id(), priority, policy).map_err(in_words)
         });
     match asked {
-        Ok(()) => Grant::Granted(format!("SCHED_FIFO, priority {PRIORITY}")),
+        Ok(()) => Grant::Granted(format!("SCHED_FIFO, priority {priority}")),
         Err(why) => Grant::Refused { why, what_to_do: SCHEDULING_TO_DO.into() },
     }
 }
@@ -159,8 +183,10 @@ mod tests {
     #[test]
     fn what_was_not_given_says_why_and_what_to_do() {
         // On a thread of its own: the scheduling of the test's must not change.
-        let report =
-            std::thread::spawn(|| RealtimeReport { scheduling: scheduling(), ..RealtimeReport::not_asked() });
+        let report = std::thread::spawn(|| RealtimeReport {
+            scheduling: take_rank(Rank::Control),
+            ..RealtimeReport::not_asked()
+        });
         let text = report.join().unwrap().to_string();
         assert!(
             text.contains("granted: SCHED_FIFO")

@@ -4,10 +4,13 @@ use std::fmt;
 use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 
-use probepath_sim::controller::{ControllerConfig, ControllerError, ControllerServer, Ports, Running, Time};
-use probepath_sim::igtl::{self, MachineServer, MachineServerConfig, MachineServerError};
+use probepath_robot::realtime::{Figures, Grant};
+use probepath_sim::controller::{
+    ControllerConfig, ControllerError, ControllerServer, Counters, Ports, Running, Time,
+};
+use probepath_sim::igtl::{self, MachineServer, MachineServerConfig, MachineServerError, Sent};
 use probepath_sim::{CellError, SimulatedCell};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::session::{CellFile, ControllerTime, IGTL_PORT, SessionError};
@@ -39,7 +42,7 @@ pub struct Simulating {
     /// `wall` or `simulated`.
     pub time: Time,
     /// What is served at which port.
-    pub ports: Vec<Served>,
+    pub ports: Vec<ServedPort>,
     /// What a client has to know of the arm.
     pub arm: ServedArm,
     #[serde(skip)]
@@ -50,7 +53,7 @@ pub struct Simulating {
 
 /// One port.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Served {
+pub struct ServedPort {
     /// Its number.
     pub port: u16,
     /// What answers there.
@@ -116,7 +119,7 @@ pub fn simulate(request: &SimulateRequest) -> Result<Simulating, SimulateError> 
         ControllerConfig { host, time, remembers_s, ..ControllerConfig::default() },
     )?;
     let machine = MachineServer::start(&cell, MachineServerConfig { host, time, ..Default::default() })?;
-    let ports = PORTS.map(|(port, what)| Served { port, what }).to_vec();
+    let ports = PORTS.map(|(port, what)| ServedPort { port, what }).to_vec();
     Ok(Simulating { cell: file.name, seed: request.seed, host, time, ports, arm, running, machine })
 }
 
@@ -156,11 +159,40 @@ fn described(cell: &SimulatedCell) -> ServedArm {
     }
 }
 
+/// What happened while a cell was served.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Served {
+    /// The controller: ticks, packages, scripts.
+    pub controller: Counters,
+    /// The ultrasound machine.
+    pub machine: Sent,
+    /// Whether the system let the controller's ticks run before all other work of this computer.
+    pub scheduling: Grant,
+    /// From when a tick was due by the wall's clock until it began.
+    pub ticks_begun: Option<Figures>,
+    /// From when a tick was due until its package had left.
+    pub packages_left: Option<Figures>,
+}
+
 impl Simulating {
-    /// What happened while it was served, in words.
-    pub fn farewell(&self) -> String {
-        let (all, sent) = (self.running.counters(), self.machine.sent());
-        format!(
+    /// What happened so far.
+    pub fn so_far(&self) -> Served {
+        let late = self.running.punctuality();
+        Served {
+            controller: self.running.counters(),
+            machine: self.machine.sent(),
+            scheduling: self.running.scheduling(),
+            ticks_begun: late.begun.figures(),
+            packages_left: late.left.figures(),
+        }
+    }
+}
+
+impl fmt::Display for Served {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { controller: all, machine: sent, .. } = self;
+        writeln!(
+            f,
             "served {} ticks, {} packages and {} scripts to {} RTDE clients; {} packages were skipped, the clock fell \
              behind the machine's {} times; {} B-scans left, {} were too old to",
             all.ticks,
@@ -171,7 +203,10 @@ impl Simulating {
             all.slips,
             sent.pictures,
             sent.stale
-        )
+        )?;
+        writeln!(f, "before all other work of this computer: {}", self.scheduling)?;
+        let late = |figures: &Option<Figures>| figures.map_or("never".into(), |late| late.to_string());
+        write!(f, "ticks begun late: {}\npackages left late: {}", late(&self.ticks_begun), late(&self.packages_left))
     }
 }
 
@@ -182,7 +217,7 @@ impl fmt::Display for Simulating {
             Time::Simulated => "a tick for each package of its client",
         };
         writeln!(f, "{} (seed {}), a simulated UR5e: {time}", self.cell, self.seed)?;
-        for Served { port, what } in &self.ports {
+        for ServedPort { port, what } in &self.ports {
             writeln!(f, "  {}:{port}  {what}", self.host)?;
         }
         let ServedArm { payload_kg, centre_of_gravity_mm: [x, y, z], .. } = self.arm;

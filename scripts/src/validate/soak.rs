@@ -1,10 +1,13 @@
 //! The soak: minutes of replay on the wire beside image capture and recording, and what was lost.
 //!
-//! The simulated cell is served on loopback; on the other end is the session as it drives hardware: driver, control
-//! thread, capture and exam file. What was lost is judged by the senders' own numbers, read back from the exam.
+//! The simulated cell is served by a process of its own; on the other end of the wire is the session as it drives
+//! hardware: driver, control thread, capture and exam file. What was lost is judged by the senders' own numbers, read
+//! back from the exam.
+
+mod served;
 
 use std::net::{IpAddr, Ipv4Addr};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -12,24 +15,25 @@ use std::time::Duration;
 use probepath_frames::{Span, Stamp};
 use probepath_robot::Operator;
 use probepath_robot::realtime::{Clock, Figures, Histogram, Monotonic, TimingFigures, be_realtime};
-use probepath_sim::controller::{ControllerConfig, ControllerServer, Counters, Time};
-use probepath_sim::igtl::{MachineServer, MachineServerConfig, Sent};
-use probepath_sim::{CellConfig, Moment, SimulatedCell};
+use probepath_sim::CellConfig;
+use probepath_sim::controller::Time;
 use probepath_us_capture::Counts;
 use probepath_us_capture::exam::{Ending, ExamEvent, ExamReader, Level, Written};
 use serde::Deserialize;
 
 use super::bench::{Folder, tell};
 use super::{Goal, Goals, ValidateError};
+use crate::offline;
 use crate::progress::Progress;
 use crate::protocol::Protocol;
-use crate::session::{
-    CellFile, ControllerTime, Opening, PUNCTUAL, ScanWish, Session, SessionError, TeachWish,
-};
+use crate::session::{CellFile, Opening, PUNCTUAL, ScanWish, Session, SessionError, TeachWish};
+use served::Served;
 
 /// What is soaked.
 #[derive(Clone, Debug)]
 pub struct SoakWish {
+    /// The program `probepath`, which serves the cell.
+    pub probepath: PathBuf,
     /// For at least so long by the cell's clock (s), whole scans.
     pub seconds: f64,
     /// The wall's time, or simulated.
@@ -41,12 +45,12 @@ pub struct SoakWish {
 }
 
 impl SoakWish {
-    /// In the wall's time, on an address of this process's own.
-    pub fn wall(minutes: f64) -> Self {
+    /// In the wall's time, served by `probepath` on an address of this process's own.
+    pub fn wall(probepath: PathBuf, minutes: f64) -> Self {
         let process = std::process::id();
         let part = |n: u32| u8::try_from(n % 250 + 1).unwrap_or(1);
         let host = IpAddr::V4(Ipv4Addr::new(127, 21, part(process / 250), part(process)));
-        Self { seconds: minutes * 60.0, time: Time::Wall, host, cell: CellConfig::default() }
+        Self { probepath, seconds: minutes * 60.0, time: Time::Wall, host, cell: CellConfig::default() }
     }
 }
 
@@ -58,24 +62,20 @@ const SEED: u64 = 1;
 /// # Errors
 /// When the cell cannot be served, a session fails, or the exam cannot be read back.
 pub fn soak(wish: &SoakWish, progress: &dyn Progress) -> Result<Goals, ValidateError> {
-    let served = |why: String| ValidateError::Served { why };
-    let cell = SimulatedCell::new(&wish.cell, SEED).map_err(|e| served(e.to_string()))?;
-    let (host, time) = (wish.host, wish.time);
-    let config = ControllerConfig { host, time, ..ControllerConfig::default() };
-    let controller = ControllerServer::start(cell.clone(), config).map_err(|e| served(e.to_string()))?;
-    let config = MachineServerConfig { host, time, ..MachineServerConfig::default() };
-    let machine = MachineServer::start(&cell, config).map_err(|e| served(e.to_string()))?;
     let folder = Folder::new("soak")?;
+    let wrong = |source| ValidateError::Session { seed: SEED, source };
+    let served = Served::start(&wish.probepath, &wish.cell, (SEED, wish.host, wish.time), folder.path())?;
+    let cell = served.wire().map_err(wrong)?;
     let enough = AtomicBool::new(false);
     let (ran, bare) = std::thread::scope(|scope| {
-        let bare = (time == Time::Wall).then(|| scope.spawn(|| bare_sleep(&enough)));
-        let ran = run(wish, &cell, folder.path(), progress);
+        let bare = (wish.time == Time::Wall).then(|| scope.spawn(|| bare_sleep(&enough)));
+        let ran = run(wish.seconds, cell, folder.path(), progress);
         enough.store(true, Ordering::Relaxed);
         (ran, bare.and_then(|bare| bare.join().ok()))
     });
-    let ran = ran.map_err(|source| ValidateError::Session { seed: SEED, source })?;
+    let (ran, served) = (ran.map_err(wrong)?, served.end()?);
     let found = Found::of(&ran.exam).map_err(|source| ValidateError::Exam { seed: SEED, source })?;
-    let rows = rows(&ran, &found, &controller.counters(), &machine.sent(), bare.as_ref());
+    let rows = rows(&ran, &found, &served, bare.as_ref());
     let what = format!("soak: {:.0} s of replay on the wire beside image capture and recording", ran.seconds);
     Ok(Goals::new(&what, 1, rows))
 }
@@ -87,21 +87,13 @@ struct Ran {
     seconds: f64,
     counts: Vec<Counts>,
     kept: usize,
-    /// What the process held after the first scan and after the last (bytes), and what of it the simulated world's
-    /// memory of the truth may be.
+    /// What the process held after the first scan and after the last (bytes).
     memory: Option<(u64, u64)>,
-    truth: u64,
 }
 
-fn run(
-    wish: &SoakWish,
-    cell: &SimulatedCell,
-    out: &Path,
-    progress: &dyn Progress,
-) -> Result<Ran, SessionError> {
-    let time = if wish.time == Time::Wall { ControllerTime::Wall } else { ControllerTime::Simulated };
+fn run(seconds: f64, cell: CellFile, out: &Path, progress: &dyn Progress) -> Result<Ran, SessionError> {
     let mut session = Session::open(Opening {
-        cell: CellFile::of_served("soak", cell, wish.host, time),
+        cell,
         seed: SEED,
         out: out.to_owned(),
         protocol: Protocol { name: "soak".into(), text: String::new() },
@@ -111,30 +103,17 @@ fn run(
     })?;
     let path = session.teach(&TeachWish { study: "SOAK".into(), ..TeachWish::default() })?;
     let scan = ScanWish { every_m: Some(KEPT_EVERY_M), ..ScanWish::default() };
-    let (began, mut counts, mut kept) = (cell.now(), Vec::new(), 0);
-    let (mut before, mut then) = (None, began);
-    while (cell.now() - began).seconds() < wish.seconds {
-        tell(progress, "soak", (cell.now() - began).seconds() as u64, wish.seconds.ceil() as u64);
+    let (began, mut counts, mut kept, mut before) = (session.now(), Vec::new(), 0, None);
+    while (session.now() - began).seconds() < seconds {
+        tell(progress, "soak", (session.now() - began).seconds() as u64, seconds.ceil() as u64);
         let scanned = session.scan(&path, &scan)?;
         counts.push(scanned.counts);
         kept += scanned.images.len();
-        if before.is_none() {
-            (before, then) = (memory(), cell.now());
-        }
+        before = before.or_else(memory);
     }
-    let now = cell.now();
-    let truth = (now - then).nanoseconds() / probepath_sim::TICK.nanoseconds();
-    let memory = before.zip(memory());
+    let (seconds, memory) = ((session.now() - began).seconds(), before.zip(memory()));
     let written = session.close()?.unwrap_or_default();
-    Ok(Ran {
-        exam: session.exam_path(),
-        written,
-        seconds: (now - began).seconds(),
-        counts,
-        kept,
-        memory,
-        truth: u64::try_from(truth).unwrap_or(0) * size_of::<Moment>() as u64,
-    })
+    Ok(Ran { exam: session.exam_path(), written, seconds, counts, kept, memory })
 }
 
 /// A B-scan is kept every 2 mm: ten minutes are then less than a gigabyte. Every one is taken and counted all the same.
@@ -194,7 +173,8 @@ fn gap(last: Option<(u64, std::borrow::Cow<'_, str>)>, tick: u64, phase: &str) -
     }
 }
 
-fn rows(ran: &Ran, found: &Found, arm: &Counters, machine: &Sent, bare: Option<&Histogram>) -> Vec<Goal> {
+fn rows(ran: &Ran, found: &Found, served: &offline::Served, bare: Option<&Histogram>) -> Vec<Goal> {
+    let (arm, machine) = (&served.controller, &served.machine);
     let none = |figure: &str, count: u64| Goal::of(figure, &[count as f64], Some(0.0), None);
     let told = |figure: &str, value: f64| Goal::of(figure, &[value], None, None);
     let of = |count: fn(&Counts) -> u64| ran.counts.iter().map(count).sum::<u64>();
@@ -220,10 +200,10 @@ fn rows(ran: &Ran, found: &Found, arm: &Counters, machine: &Sent, bare: Option<&
         rows.push(none("ticks skipped, by the arm's count", punctual.figures.skipped));
         rows.extend(timing(&punctual.figures, bare.and_then(Histogram::figures).as_ref()));
     }
+    rows.extend(lateness("sent: ticks begun late", served.ticks_begun));
+    rows.extend(lateness("sent: packages left late", served.packages_left));
     if let Some((before, after)) = ran.memory {
-        let grown = after as f64 - before as f64;
-        rows.push(told("memory grown since the first scan, MB", grown / 1e6));
-        rows.push(told("of it at most the simulation's own truth, MB", ran.truth as f64 / 1e6));
+        rows.push(told("memory grown since the first scan, MB", (after as f64 - before as f64) / 1e6));
     }
     rows
 }
@@ -232,20 +212,26 @@ fn rows(ran: &Ran, found: &Found, arm: &Counters, machine: &Sent, bare: Option<&
 fn timing(figures: &TimingFigures, bare: Option<&Figures>) -> Vec<Goal> {
     let named =
         [("tick lateness", figures.lateness), ("step", figures.step), ("round trip", figures.round_trip)];
-    let each = |f: &Figures| [("p50", f.p50_us), ("p99", f.p99_us), ("p99.9", f.p99_9_us), ("max", f.max_us)];
-    let told = |figure: String, value: f64| Goal::of(figure, &[value], None, None);
     let mut rows = Vec::new();
     for (name, found) in named.into_iter().chain([("a bare sleep's lateness", bare.copied())]) {
-        let Some(found) = found else { continue };
-        rows.extend(each(&found).map(|(which, us)| told(format!("{name}, {which}, us"), us)));
+        rows.extend(lateness(name, found));
     }
     if let Some((ours, bare)) = figures.lateness.as_ref().zip(bare) {
-        let pairs = each(ours).into_iter().zip(each(bare));
+        let pairs = shares(ours).into_iter().zip(shares(bare));
         rows.extend(pairs.map(|((which, ours), (_, bare))| {
-            told(format!("tick lateness over the bare sleep's, {which}"), ours / bare)
+            Goal::of(format!("tick lateness over the bare sleep's, {which}"), &[ours / bare], None, None)
         }));
     }
     rows
+}
+
+fn lateness(name: &str, found: Option<Figures>) -> impl Iterator<Item = Goal> {
+    let each = found.map(|found| shares(&found)).into_iter().flatten();
+    each.map(move |(which, us)| Goal::of(format!("{name}, {which}, us"), &[us], None, None))
+}
+
+fn shares(f: &Figures) -> [(&'static str, f64); 4] {
+    [("p50", f.p50_us), ("p99", f.p99_us), ("p99.9", f.p99_9_us), ("max", f.max_us)]
 }
 
 /// How late a thread wakes that only sleeps from tick to tick and asks for what a control thread asks for.

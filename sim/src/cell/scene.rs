@@ -1,5 +1,6 @@
 //! The one world that arm, machine and hand share.
 
+use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -60,11 +61,29 @@ impl Shared {
     }
 }
 
+/// What may touch the probe: asked while the world goes on, so that no tick waits for a picture.
+#[derive(Clone, Debug)]
+pub(crate) struct Surroundings {
+    subject: Arc<Subject>,
+    skin: Arc<Skin>,
+    disturbance: Disturbance,
+}
+
+impl Surroundings {
+    /// Where gel joins the face to the skin, or water to all that is under it, along the probe's x (m).
+    pub(crate) fn touched(&self, world_from_probe: &Pose<World, Probe>) -> Option<(f64, f64)> {
+        if let Some(tank) = self.subject.tank() {
+            return tank.wet(world_from_probe);
+        }
+        self.skin.touched(&*self.subject, world_from_probe, &self.disturbance)
+    }
+}
+
 /// The world: what lies there, how the arm stands, and everything that was.
 #[derive(Debug)]
 pub(crate) struct Scene {
     subject: Arc<Subject>,
-    skin: Skin,
+    skin: Arc<Skin>,
     nominal: Nominal,
     config: ArmConfig,
     chain: TrueChain,
@@ -76,7 +95,7 @@ pub(crate) struct Scene {
     seed: u64,
     guided: u64,
     connections: u64,
-    moments: Vec<Moment>,
+    moments: VecDeque<Moment>,
     /// How many moments were forgotten before the first that is kept.
     forgotten: u64,
     /// Told at every tick.
@@ -99,7 +118,7 @@ impl Scene {
         };
         let mut scene = Self {
             subject,
-            skin: Skin::new(&config.skin, seed),
+            skin: Arc::new(Skin::new(&config.skin, seed)),
             config: config.arm.clone(),
             chain: TrueChain::new(&blueprint, config.arm.kinematic_error, seed)?,
             servo: Servo::new(nominal.start, config.arm.servo_lag_ms * 1e-3),
@@ -110,7 +129,7 @@ impl Scene {
             seed,
             guided: 0,
             connections: 0,
-            moments: Vec::new(),
+            moments: VecDeque::new(),
             forgotten: 0,
             moved: Arc::default(),
             nominal,
@@ -118,7 +137,7 @@ impl Scene {
         let (joints, world_from_probe) = scene.reached();
         let (skin, hand) = (Wrench::zero(), Wrench::zero());
         let stamp = Stamp::ZERO;
-        scene.moments.push(Moment { stamp, joints, world_from_probe, skin, hand, guiding: false });
+        scene.moments.push_back(Moment { stamp, joints, world_from_probe, skin, hand, guiding: false });
         Ok(scene)
     }
 
@@ -135,7 +154,7 @@ impl Scene {
         let felt = skin.force.norm();
         let grip = self.hand.as_mut().map(|hand| hand.step(&world_from_probe, &twist, felt, TICK.seconds()));
         let (hand, guiding) = grip.map_or((Wrench::zero(), false), |grip| (grip.wrench, grip.guiding));
-        self.moments.push(Moment { stamp: now, joints, world_from_probe, skin, hand, guiding });
+        self.moments.push_back(Moment { stamp: now, joints, world_from_probe, skin, hand, guiding });
         self.moved.notify_all();
     }
 
@@ -209,21 +228,20 @@ impl Scene {
         &self.moments[self.moments.len() - 1]
     }
 
-    /// Keeps the last `most` moments, and at most as many again until it forgets them.
+    /// Keeps the last `most` moments.
     pub(crate) fn forget_before(&mut self, most: usize) {
-        if self.moments.len() > most.max(1).saturating_mul(2) {
-            let old = self.moments.len() - most.max(1);
-            self.moments.drain(..old);
-            self.forgotten += old as u64;
+        while self.moments.len() > most.max(1) {
+            self.moments.pop_front();
+            self.forgotten += 1;
         }
     }
 
-    pub(crate) fn moments(&self) -> &[Moment] {
-        &self.moments
+    pub(crate) fn moments(&self) -> impl Iterator<Item = &Moment> {
+        self.moments.iter()
     }
 
     /// Ticks since the world's beginning.
-    pub(crate) const fn tick(&self) -> u64 {
+    pub(crate) fn tick(&self) -> u64 {
         self.forgotten + self.moments.len() as u64 - 1
     }
 
@@ -317,7 +335,7 @@ impl Scene {
 
     /// Where the probe truly was between two ticks; `None` before the beginning and after now.
     pub(crate) fn world_from_probe(&self, at: Stamp) -> Option<Pose<World, Probe>> {
-        let since = (at - self.moments.first()?.stamp).nanoseconds();
+        let since = (at - self.moments.front()?.stamp).nanoseconds();
         let index = usize::try_from(since / TICK.nanoseconds()).ok().filter(|_| since >= 0)?;
         let before = self.moments.get(index)?;
         let fraction = (at - before.stamp).seconds() / TICK.seconds();
@@ -341,11 +359,9 @@ impl Scene {
         self.config.position_noise_rad
     }
 
-    /// Where gel joins the face to the skin, or water to all that is under it, along the probe's x (m).
-    pub(crate) fn touched(&self, world_from_probe: &Pose<World, Probe>) -> Option<(f64, f64)> {
-        if let Some(tank) = self.subject.tank() {
-            return tank.wet(world_from_probe);
-        }
-        self.skin.touched(&*self.subject, world_from_probe, &self.disturbance)
+    /// What may touch the probe, as it is now.
+    pub(crate) fn surroundings(&self) -> Surroundings {
+        let disturbance = self.disturbance.clone();
+        Surroundings { subject: self.subject.clone(), skin: self.skin.clone(), disturbance }
     }
 }

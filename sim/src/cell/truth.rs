@@ -87,7 +87,7 @@ impl Truth {
 
     /// Everything that was, tick by tick, from the world's beginning.
     pub fn moments(&self) -> Vec<Moment> {
-        self.scene.lock().moments().to_vec()
+        self.scene.lock().moments().copied().collect()
     }
 
     /// What is now.

@@ -1,6 +1,7 @@
 //! [`Controller`]: everything behind the sockets, without one: registers, program, robot, pendant.
 
 use probepath_frames::{Span, Stamp};
+use serde::{Deserialize, Serialize};
 
 use super::config::{ControllerConfig, Helper};
 use super::program::{Cycle, Hung, Program, TICKS_PER_S};
@@ -34,7 +35,7 @@ pub(super) struct Io {
 }
 
 /// What happened, for tests and for people.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Counters {
     /// Ticks since the start.

@@ -1,4 +1,6 @@
-//! Sockets and threads around the controller: one thread ticks, two serve each RTDE connection, one each other.
+//! Sockets and threads around the controller: one thread ticks, two serve each RTDE connection, one each other. In wall
+//! time all of them rank before a control thread of this computer: a real controller is a machine of its own, and waits
+//! for nothing that is done here.
 
 mod lines;
 mod outbox;
@@ -8,12 +10,16 @@ mod rtde;
 use std::collections::BTreeMap;
 use std::net::{IpAddr, Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::JoinHandle;
+use std::time::Instant;
+
+use probepath_frames::Span;
+use probepath_robot::realtime::{Grant, Histogram, Rank, take_rank};
 
 use super::core::Controller;
 use super::session::{Owners, Session};
-use super::{ControllerError, Ports};
+use super::{ControllerError, Ports, Time};
 use outbox::Outbox;
 
 /// Everything that the threads share.
@@ -23,6 +29,17 @@ pub(super) struct Server {
     came: Condvar,
     stopping: AtomicBool,
     sockets: Mutex<BTreeMap<u64, TcpStream>>,
+    punctuality: Mutex<Punctuality>,
+    scheduling: OnceLock<Grant>,
+}
+
+/// How late the simulated controller itself was, by the wall's clock; nothing is counted in simulated time.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Punctuality {
+    /// From when a tick was due until it began.
+    pub begun: Histogram,
+    /// From when a tick was due until its package had left, for each client.
+    pub left: Histogram,
 }
 
 /// What is behind the one lock.
@@ -58,12 +75,28 @@ impl Server {
             came: Condvar::new(),
             stopping: AtomicBool::new(false),
             sockets: Mutex::new(BTreeMap::new()),
+            punctuality: Mutex::default(),
+            scheduling: OnceLock::new(),
         })
     }
 
     /// The world, for one caller at a time; a thread that panicked left it between two calls.
     pub(super) fn world(&self) -> MutexGuard<'_, World> {
         self.world.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// How late it was so far.
+    pub(super) fn punctuality(&self) -> MutexGuard<'_, Punctuality> {
+        self.punctuality.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What the system granted the thread that ticks; not asked for until it began.
+    pub(super) fn scheduling(&self) -> Grant {
+        self.scheduling.get().cloned().unwrap_or(Grant::NotAsked)
+    }
+
+    fn ranked(&self, grant: Grant) {
+        let _ = self.scheduling.set(grant);
     }
 
     pub(super) fn is_stopping(&self) -> bool {
@@ -141,9 +174,17 @@ pub(super) fn start(
     let mut threads = Vec::new();
     let ticking = server.clone();
     threads.push(spawn("ticks", move || pace::run(&ticking))?);
+    let urgent = server.world().controller.config.time == Time::Wall;
     for (listener, what, serve) in listeners {
         let server = server.clone();
-        threads.push(spawn(what, move || accept(&server, &listener, what, serve))?);
+        let accepting = move || {
+            if urgent {
+                // Its connections' threads too; what was granted is what the ticking thread was.
+                let _ = take_rank(Rank::Controller);
+            }
+            accept(&server, &listener, what, serve);
+        };
+        threads.push(spawn(what, accepting)?);
     }
     Ok(threads)
 }
@@ -159,6 +200,11 @@ fn accept(server: &Arc<Server>, listener: &TcpListener, what: &'static str, serv
         // A thread that cannot be had costs this connection, not the others: the socket closes.
         let _ = spawn(what, move || serve(&serving, socket));
     }
+}
+
+fn since(due: Instant) -> Span {
+    let late = Instant::now().saturating_duration_since(due);
+    Span::from_nanoseconds(i64::try_from(late.as_nanos()).unwrap_or(i64::MAX))
 }
 
 fn spawn(name: &str, work: impl FnOnce() + Send + 'static) -> Result<JoinHandle<()>, ControllerError> {

@@ -18,10 +18,19 @@ pub(super) struct Letter {
     pub(super) bytes: Vec<u8>,
     /// Not before.
     pub(super) due: Option<Instant>,
+    /// When the tick was due that it tells of, in wall time.
+    pub(super) of_tick: Option<Instant>,
     /// A data package that may be skipped.
     pub(super) fleeting: bool,
     /// The connection ends after it.
     pub(super) last: bool,
+}
+
+impl Letter {
+    /// What is said once, and never skipped.
+    pub(super) const fn answer(bytes: Vec<u8>, last: bool) -> Self {
+        Self { bytes, due: None, of_tick: None, fleeting: false, last }
+    }
 }
 
 /// The letters of one connection.
@@ -81,7 +90,7 @@ mod tests {
     use super::*;
 
     fn letter(number: u8, fleeting: bool) -> Letter {
-        Letter { bytes: vec![number], due: None, fleeting, last: false }
+        Letter { bytes: vec![number], due: None, of_tick: None, fleeting, last: false }
     }
 
     #[test]

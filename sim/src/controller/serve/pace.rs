@@ -8,7 +8,9 @@
 use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::{Server, World};
+use probepath_robot::realtime::{Rank, take_rank};
+
+use super::{Server, World, since};
 use crate::controller::Time;
 
 /// A tick in wall time.
@@ -27,12 +29,14 @@ pub(super) fn run(server: &Arc<Server>) {
 
 /// 500 Hz, and never a burst: a tick that comes late moves all later ones.
 fn wall(server: &Server) {
+    server.ranked(take_rank(Rank::Controller));
     let mut next = Instant::now();
     while !server.is_stopping() {
+        server.punctuality().begun.record(since(next));
         {
             let mut world = server.world();
             world.tick();
-            world.send(false);
+            world.send(next);
         }
         next += TICK;
         let now = Instant::now();
@@ -55,7 +59,7 @@ fn simulated(server: &Server) {
             Some(pulses) if seen.is_none_or(|seen| pulses != seen) => {
                 world.tick();
                 seen = Some(world.pulses().unwrap_or(pulses));
-                world.send(false);
+                world.send_in_step(false);
             }
             Some(_) => {
                 let waited = server.came.wait_timeout(world, AGAIN);
@@ -65,11 +69,11 @@ fn simulated(server: &Server) {
             None if world.controller.is_unsettled() => {
                 seen = None;
                 world.tick();
-                world.send(false);
+                world.send_in_step(false);
             }
             None => {
                 seen = None;
-                world.send(true);
+                world.send_in_step(true);
                 let waited = server.came.wait_timeout(world, AGAIN);
                 drop(waited.unwrap_or_else(PoisonError::into_inner));
             }

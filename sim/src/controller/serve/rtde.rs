@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::outbox::{Letter, Outbox};
-use super::{Client, Server, World, spawn};
+use super::{Client, Server, World, since, spawn};
 use crate::controller::session::{Heard, Session};
 
 /// Serves one connection until it ends.
@@ -19,14 +19,14 @@ pub(super) fn serve(server: &Arc<Server>, mut socket: TcpStream) {
     let (id, outbox) = (server.keep(&socket), Arc::new(Outbox::default()));
     server.world().join(id, &outbox);
     let Ok(writing) = socket.try_clone() else { return server.leave(id) };
-    let letters = outbox.clone();
-    let writer = spawn("rtde-out", move || write(writing, &letters));
+    let (writing_for, letters) = (server.clone(), outbox.clone());
+    let writer = spawn("rtde-out", move || write(&writing_for, writing, &letters));
     let mut bytes = [0; 8192];
     while let Ok(count @ 1..) = socket.read(&mut bytes) {
         let Some(bytes) = bytes.get(..count) else { break };
         let heard = server.world().hear(id, bytes);
         if !heard.replies.is_empty() {
-            outbox.put(Letter { bytes: heard.replies, due: None, fleeting: false, last: heard.close });
+            outbox.put(Letter::answer(heard.replies, heard.close));
         }
         server.came.notify_all();
         if heard.close {
@@ -39,9 +39,13 @@ pub(super) fn serve(server: &Arc<Server>, mut socket: TcpStream) {
     }
 }
 
-fn write(mut socket: TcpStream, outbox: &Outbox) {
+fn write(server: &Server, mut socket: TcpStream, outbox: &Outbox) {
     while let Some(letter) = outbox.take() {
-        if socket.write_all(&letter.bytes).is_err() || letter.last {
+        let sent = socket.write_all(&letter.bytes).is_ok();
+        if let Some(due) = letter.of_tick.filter(|_| sent) {
+            server.punctuality().left.record(since(due));
+        }
+        if !sent || letter.last {
             break;
         }
     }
@@ -55,7 +59,7 @@ impl Server {
         world.owners.retain(|_, owner| *owner != id);
         if let Some(client) = world.clients.remove(&id) {
             // What is under way may still leave: the answer that says why it was closed, above all.
-            client.outbox.put(Letter { bytes: Vec::new(), due: None, fleeting: false, last: true });
+            client.outbox.put(Letter::answer(Vec::new(), true));
         }
         drop(world);
         self.forget(id);
@@ -92,8 +96,17 @@ impl World {
         self.pulses.get(index).copied()
     }
 
-    /// Sends everyone the package of this tick; with `anyway`, whether it is due or not.
-    pub(super) fn send(&mut self, anyway: bool) {
+    /// Sends everyone the package of this tick, which was due then in wall time.
+    pub(super) fn send(&mut self, of_tick: Instant) {
+        self.post(false, Some(of_tick));
+    }
+
+    /// The same in simulated time; with `anyway`, whether it is due or not.
+    pub(super) fn send_in_step(&mut self, anyway: bool) {
+        self.post(anyway, None);
+    }
+
+    fn post(&mut self, anyway: bool, of_tick: Option<Instant>) {
         let tick = self.controller.counters.ticks;
         let knobs = &self.controller.config.knobs;
         let has = |ticks: Option<crate::knobs::Ticks>| ticks.is_some_and(|ticks| ticks.has(tick));
@@ -113,8 +126,9 @@ impl World {
                 bytes.truncate(bytes.len() / 2);
             }
             self.controller.counters.packages += 1;
-            let fleeting = self.controller.config.time == crate::controller::Time::Wall && !cut;
-            self.controller.counters.skipped += client.outbox.put(Letter { bytes, due, fleeting, last: cut });
+            let fleeting = of_tick.is_some() && !cut;
+            let letter = Letter { bytes, due, of_tick, fleeting, last: cut };
+            self.controller.counters.skipped += client.outbox.put(letter);
         }
     }
 
@@ -130,7 +144,7 @@ impl World {
     pub(super) fn tell(&self, message: &str, level: u8) {
         for client in self.clients.values() {
             let bytes = client.session.text(message, level);
-            client.outbox.put(Letter { bytes, due: None, fleeting: false, last: false });
+            client.outbox.put(Letter::answer(bytes, false));
         }
     }
 }
