@@ -75,3 +75,20 @@ fn a_host_that_is_taken_is_said_with_its_port() {
     assert!(said.contains(&host) && said.contains("30004"), "{said}");
     assert_eq!(interrupt(child).status.code(), Some(0));
 }
+
+#[test]
+fn it_ends_with_its_standard_input_and_leaves_what_happened() {
+    let host = host(2);
+    let report = std::env::temp_dir().join(format!("probepath-served-{}.json", std::process::id()));
+    let arguments = ["simulate", "--json", "--host", &host, "--until-input-ends", "--report"];
+    let mut child = probepath(&arguments).arg(&report).stdin(Stdio::piped()).spawn().unwrap();
+    document(&mut child);
+    drop(child.stdin.take());
+    assert_eq!(child.wait_with_output().unwrap().status.code(), Some(0));
+    let said: Value = serde_json::from_str(&std::fs::read_to_string(&report).unwrap()).unwrap();
+    std::fs::remove_file(&report).unwrap();
+    assert!(said["controller"]["ticks"].as_u64().unwrap() > 0, "{said}");
+    assert_eq!(said["machine"]["pictures"].as_u64(), Some(0));
+    assert!(said["ticks_begun"]["count"].as_u64().unwrap() > 0, "{said}");
+    assert!(said["scheduling"]["granted"].is_string() || said["scheduling"]["refused"].is_object(), "{said}");
+}

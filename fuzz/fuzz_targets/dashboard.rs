@@ -1,25 +1,7 @@
-//! The dashboard's lines: however a stream is cut, what is refused whole is refused in pieces, and what is read is the
-//! same. The first byte says how the stream is cut.
+//! `fuzz/checks/dashboard.rs` on whatever the fuzzer finds.
 #![no_main]
 
-use libfuzzer_sys::fuzz_target;
-use probepath_robot::drivers::ur::lines::{LONGEST, Lines};
+#[path = "../checks/dashboard.rs"]
+mod dashboard;
 
-fuzz_target!(|bytes: &[u8]| {
-    let Some((cut, stream)) = bytes.split_first() else { return };
-    let (whole, in_pieces) = (read(stream, usize::MAX), read(stream, usize::from(*cut).max(1)));
-    assert_eq!(whole, in_pieces);
-    assert!(whole.iter().flatten().all(|line| line.len() <= LONGEST && !line.contains('\n')));
-});
-
-fn read(stream: &[u8], piece: usize) -> Option<Vec<String>> {
-    let (mut lines, mut all, mut rest) = (Lines::new(), Vec::new(), stream);
-    while !rest.is_empty() {
-        let taken = lines.feed(&rest[..piece.min(rest.len())]);
-        rest = &rest[taken..];
-        while let Some(line) = lines.next().ok()? {
-            all.push(line.to_owned());
-        }
-    }
-    Some(all)
-}
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| dashboard::check(bytes));

@@ -1,15 +1,7 @@
-//! The scripts that a controller is sent: any bytes are recognised as something, and what is read from our own text is
-//! what another text of it says.
+//! `fuzz/checks/script.rs` on whatever the fuzzer finds.
 #![no_main]
 
-use libfuzzer_sys::fuzz_target;
-use probepath_robot::drivers::ur::script::Parameters;
-use probepath_sim::controller::recognise;
+#[path = "../checks/script.rs"]
+mod script;
 
-fuzz_target!(|bytes: &[u8]| {
-    let _ = recognise(bytes);
-    let Ok(text) = std::str::from_utf8(bytes) else { return };
-    if let Some(read) = Parameters::read(text) {
-        assert_eq!(Parameters::read(&read.text()), Some(read));
-    }
-});
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| script::check(bytes));

@@ -206,7 +206,12 @@ impl fmt::Display for Served {
         )?;
         writeln!(f, "before all other work of this computer: {}", self.scheduling)?;
         let late = |figures: &Option<Figures>| figures.map_or("never".into(), |late| late.to_string());
-        write!(f, "ticks begun late: {}\npackages left late: {}", late(&self.ticks_begun), late(&self.packages_left))
+        write!(
+            f,
+            "ticks begun late: {}\npackages left late: {}",
+            late(&self.ticks_begun),
+            late(&self.packages_left)
+        )
     }
 }
 

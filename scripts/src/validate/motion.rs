@@ -1,5 +1,7 @@
 //! Every commanded motion within the limits, read back from the exam file; the path's error; and the recorded exam
-//! that gives the same commands.
+//! that gives the same commands. And the timing of paths: how quick, how near to the optimum.
+
+mod timing;
 
 use std::path::Path;
 use std::sync::Arc;
@@ -137,7 +139,9 @@ pub fn motion(seeds: u64, progress: &dyn Progress) -> Result<Goals, ValidateErro
         tell(progress, "motion, ticks", columns.ticks, TICKS);
         columns.scanned(seed, &wish, 1, folder.path())?;
     }
-    Ok(Goals::new("motion: teach and replay along the leg, read back from the exam", seeds, columns.rows()))
+    let mut rows = columns.rows();
+    rows.extend(timing::rows());
+    Ok(Goals::new("motion: teach and replay along the leg, read back from the exam", seeds, rows))
 }
 
 impl Columns {

@@ -14,9 +14,14 @@
 //! `b` is a quadratic B-spline, so every limit touches three neighbouring unknowns and a step is one banded
 //! elimination.
 
+mod press;
+
+use std::ops::Range;
+
 use super::bands::Bands;
 use super::way::{Motion, Way};
 use super::{MotionBounds, PathSpeed};
+use press::{Change, Limit, Pressed, changed, dot, nearer, outer, turned};
 
 /// A place where the limits are asked.
 struct Place {
@@ -26,17 +31,9 @@ struct Place {
     basis: [[f64; 3]; 3],
     /// The largest `b` that the velocities allow.
     fastest: f64,
-    /// Where its rows begin.
-    rows: usize,
-}
-
-/// One limit, either way: `|row . (b, b', b'')| <= 1`, or `<= 1 / sqrt(b)` for a jerk.
-#[derive(Clone, Copy)]
-struct Limit {
-    row: [f64; 3],
-    is_jerk: bool,
-    slack: [f64; 2],
-    dual: [f64; 2],
+    /// Where its accelerations begin, and its jerks behind them.
+    accelerations: usize,
+    jerks: usize,
 }
 
 /// The speed along inner cells of the path, as control points of a quadratic B-spline.
@@ -51,6 +48,9 @@ pub(super) struct Fastest<'a> {
     control: Vec<f64>,
     bands: Bands,
     right: Vec<f64>,
+    /// Of every limit, and of every top (slack and dual).
+    changes: Vec<Change>,
+    top_changes: Vec<(f64, f64)>,
 }
 
 /// What a search begins with.
@@ -64,8 +64,6 @@ pub(super) enum Start {
 
 /// Where two-point Gauss integration asks.
 const GAUSS: [f64; 2] = [0.211_324_865_405_187_13, 0.788_675_134_594_812_9];
-/// Part of the way to the nearest bound that a step takes.
-const CLOSE: f64 = 0.99;
 /// The optimum is near enough when the duality gap is this part of the time.
 const GAP: f64 = 3e-4;
 const MOST_STEPS: usize = 60;
@@ -91,6 +89,8 @@ impl<'a> Fastest<'a> {
             bands: Bands::zeros(control.len()),
             right: vec![0.0; control.len()],
             control,
+            changes: Vec::new(),
+            top_changes: Vec::new(),
         };
         let zigzag = zigzag_s(way, wanted);
         for (cell, tight) in tight.iter().enumerate() {
@@ -126,30 +126,44 @@ impl<'a> Fastest<'a> {
         let [first, second, third] = &slopes;
         let [velocity, acceleration, jerk] = way.per();
         let top = wanted.speed.min(1.0 / first.component_mul(velocity).amax()) / tight.velocity;
-        let rows = self.limits.len();
-        self.places.push(Place {
-            at: cell,
-            basis: basis(self.nodes, cell, part * h),
-            fastest: top * top,
-            rows,
-        });
-        let mut add = |row: [f64; 3], is_jerk: bool| {
-            self.limits.push(Limit { row, is_jerk, slack: [1.0; 2], dual: [1.0; 2] });
-        };
+        let fastest = top * top;
         let (most_a, most_j) = (wanted.acceleration / tight.acceleration, wanted.jerk / tight.jerk);
-        add([0.0, 0.5 / most_a, 0.0], false);
-        add([0.0, 0.0, 0.5 / most_j], true);
-        for joint in 0..way.joints() {
-            let (a, j) = (acceleration[joint] * tight.acceleration, jerk[joint] * tight.jerk);
-            let (q1, q2, q3) = (first[joint], second[joint], third[joint]);
-            add([q2 * a, 0.5 * q1 * a, 0.0], false);
-            add([q3 * j, 1.5 * q2 * j, 0.5 * q1 * j], true);
-        }
+        let joints = || (0..way.joints()).map(|joint| (joint, first[joint], second[joint], third[joint]));
+        let accelerations = joints().map(|(joint, q1, q2, _)| {
+            let a = acceleration[joint] * tight.acceleration;
+            [q2 * a, 0.5 * q1 * a, 0.0]
+        });
+        let jerks = joints().map(|(joint, q1, q2, q3)| {
+            let j = jerk[joint] * tight.jerk;
+            [q3 * j, 1.5 * q2 * j, 0.5 * q1 * j]
+        });
+        let begin = self.limits.len();
+        let slope = self.keep([fastest, 0.0, 1.0], 1, accelerations.chain([[0.0, 0.5 / most_a, 0.0]]));
+        let middle = self.limits.len();
+        let steepest = [fastest * top, slope * top, 1.0];
+        self.keep(steepest, 2, jerks.chain([[0.0, 0.0, 0.5 / most_j]]));
+        let basis = basis(self.nodes, cell, part * h);
+        self.places.push(Place { at: cell, basis, fastest, accelerations: begin, jerks: middle });
     }
 
-    fn rows(&self, place: usize) -> std::ops::Range<usize> {
-        let end = self.places.get(place + 1).map_or(self.limits.len(), |next| next.rows);
-        self.places[place].rows..end
+    /// Keeps those of a place's limits that can bind: where all others keep the parts of `(b, b', b'')` below what
+    /// `most` says, up to the one at `last`, and the strictest of them bounds that, some can never be reached. Gives
+    /// that bound.
+    fn keep(&mut self, most: [f64; 3], last: usize, rows: impl Iterator<Item = [f64; 3]> + Clone) -> f64 {
+        let before = |row: &[f64; 3]| (0..last).map(|k| row[k].abs() * most[k]).sum::<f64>();
+        let bound =
+            rows.clone().map(|row| (1.0 + before(&row)) / row[last].abs()).fold(f64::INFINITY, f64::min);
+        let can_bind = |row: &[f64; 3]| before(row) + row[last].abs() * bound >= REDUNDANT;
+        let kept = rows.filter(can_bind).map(|row| Limit { row, slack: [1.0; 2], dual: [1.0; 2] });
+        self.limits.extend(kept);
+        bound
+    }
+
+    /// The accelerations of a place, and its jerks.
+    fn rows(&self, place: usize) -> [Range<usize>; 2] {
+        let Place { accelerations, jerks, .. } = self.places[place];
+        let end = self.places.get(place + 1).map_or(self.limits.len(), |next| next.accelerations);
+        [accelerations..jerks, jerks..end]
     }
 
     /// `b`, `b'`, `b''` of unknowns at a place.
@@ -173,17 +187,16 @@ impl<'a> Fastest<'a> {
             let top = &self.places[place];
             let slack = (top.fastest - jet[0]).max(least * top.fastest);
             self.tops.push((slack, mu / slack));
-            let bound = 1.0 / jet[0].sqrt();
-            let rows = self.rows(place);
-            for limit in &mut self.limits[rows] {
-                let most = if limit.is_jerk { bound } else { 1.0 };
-                let value = dot(&limit.row, &jet);
-                for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
-                    limit.slack[side] = (most - sign * value).max(least * most);
-                    limit.dual[side] = mu / limit.slack[side];
+            for (rows, most) in self.rows(place).into_iter().zip([1.0, 1.0 / jet[0].sqrt()]) {
+                for limit in &mut self.limits[rows] {
+                    let value = dot(&limit.row, &jet);
+                    limit.slack = [value, -value].map(|value| (most - value).max(least * most));
+                    limit.dual = limit.slack.map(|slack| mu / slack);
                 }
             }
         }
+        self.changes = vec![Change::default(); self.limits.len()];
+        self.top_changes = vec![(0.0, 0.0); self.tops.len()];
     }
 
     /// The time it takes (s).
@@ -227,10 +240,9 @@ impl<'a> Fastest<'a> {
         for place in 0..self.places.len() {
             let jet = self.jet(place, &self.control);
             worst = worst.max(jet[0] / self.places[place].fastest - 1.0);
-            let root = jet[0].sqrt();
-            for limit in &self.limits[self.rows(place)] {
-                let share = dot(&limit.row, &jet).abs() * if limit.is_jerk { root } else { 1.0 };
-                worst = worst.max(share - 1.0);
+            for (rows, root) in self.rows(place).into_iter().zip([1.0, jet[0].sqrt()]) {
+                let shares = self.limits[rows].iter().map(|limit| dot(&limit.row, &jet).abs() * root);
+                worst = shares.fold(worst, |worst, share| worst.max(share - 1.0));
             }
         }
         worst
@@ -266,84 +278,83 @@ impl<'a> Fastest<'a> {
     }
 
     /// What the limits of a place add: a square form on `(b, b', b'')` and a slope.
-    fn pressed(&self, place: usize, jet: &[f64; 3], mu: f64) -> ([[f64; 3]; 3], [f64; 3]) {
-        let bound = 1.0 / jet[0].sqrt();
-        let falls = 0.5 * bound / jet[0];
+    fn pressed(&mut self, place: usize, jet: &[f64; 3], mu: f64) -> ([[f64; 3]; 3], [f64; 3]) {
         let mut square = [[0.0; 3]; 3];
         let mut pull = [0.0; 3];
         let (slack, dual) = self.tops[place];
         let weight = dual / slack;
         square[0][0] += weight;
         pull[0] += mu / slack + weight * (jet[0] - self.places[place].fastest + slack);
-        for limit in &self.limits[self.rows(place)] {
-            let (most, falls) = if limit.is_jerk { (bound, falls) } else { (1.0, 0.0) };
-            let value = dot(&limit.row, jet);
-            let weights = [limit.dual[0] / limit.slack[0], limit.dual[1] / limit.slack[1]];
-            let force = |side: usize, value: f64| {
-                mu / limit.slack[side] + weights[side] * (value - most + limit.slack[side])
-            };
-            let (up, down) = (force(0, value), force(1, -value));
-            let (both, odd) = (weights[0] + weights[1], weights[0] - weights[1]);
-            let row = &limit.row;
+        let [accelerations, jerks] = self.rows(place);
+        for (limit, change) in self.limits[accelerations.clone()].iter().zip(&mut self.changes[accelerations])
+        {
+            let pressed = Pressed::by(limit, change, dot(&limit.row, jet), 1.0, mu);
+            pressed.on(&limit.row, &mut square, &mut pull);
+        }
+        let most = 1.0 / jet[0].sqrt();
+        let falls = 0.5 * most / jet[0];
+        for (limit, change) in self.limits[jerks.clone()].iter().zip(&mut self.changes[jerks]) {
+            let (row, pressed) = (&limit.row, Pressed::by(limit, change, dot(&limit.row, jet), most, mu));
+            pressed.on(row, &mut square, &mut pull);
             for (i, here) in row.iter().enumerate() {
-                for (k, there) in row.iter().enumerate().skip(i) {
-                    square[i][k] += both * here * there;
-                }
-                square[0][i] += falls * odd * here;
-                pull[i] += here * (up - down);
+                square[0][i] += falls * pressed.odd * here;
             }
-            square[0][0] += falls * (odd * row[0] + falls * both);
-            pull[0] += falls * (up + down);
+            square[0][0] += falls * (pressed.odd * row[0] + falls * pressed.both);
+            pull[0] += falls * (pressed.up + pressed.down);
         }
         (square, pull)
     }
 
     /// Along the direction in `right`, as far as slacks, duals and `b` stay above zero.
     fn step(&mut self, mu: f64) {
-        let (mut far, mut far_dual) = (1.0_f64, 1.0_f64);
         let direction = std::mem::take(&mut self.right);
-        let mut changes = Vec::with_capacity(self.limits.len());
-        let mut tops = Vec::with_capacity(self.places.len());
+        let (mut far, mut far_dual) = (1.0_f64, 1.0_f64);
         for place in 0..self.places.len() {
-            let jet = self.jet(place, &self.control);
-            let by = self.jet(place, &direction);
+            let (jet, by) = (self.jet(place, &self.control), self.jet(place, &direction));
             far = nearer(far, jet[0], by[0]);
-            let top = changed(self.tops[place], jet[0] - self.places[place].fastest, by[0], mu);
-            far = nearer(far, self.tops[place].0, top.0);
-            far_dual = nearer(far_dual, self.tops[place].1, top.1);
-            tops.push(top);
+            let now = self.tops[place];
+            let top = changed(now, 1.0 / now.0, jet[0] - self.places[place].fastest, by[0], mu);
+            far = nearer(far, now.0, top.0);
+            far_dual = nearer(far_dual, now.1, top.1);
+            self.top_changes[place] = top;
             let bound = 1.0 / jet[0].sqrt();
-            let falls = 0.5 * bound / jet[0] * by[0];
-            for limit in &self.limits[self.rows(place)] {
-                let (most, falls) = if limit.is_jerk { (bound, falls) } else { (1.0, 0.0) };
-                let (value, slope) = (dot(&limit.row, &jet), dot(&limit.row, &by));
-                let mut change = [(0.0, 0.0); 2];
-                for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
-                    let now = (limit.slack[side], limit.dual[side]);
-                    change[side] = changed(now, sign * value - most, sign * slope + falls, mu);
-                    far = nearer(far, now.0, change[side].0);
-                    far_dual = nearer(far_dual, now.1, change[side].1);
+            let kinds = [(1.0, 0.0), (bound, 0.5 * bound / jet[0] * by[0])];
+            for (rows, (most, falls)) in self.rows(place).into_iter().zip(kinds) {
+                for (limit, change) in self.limits[rows.clone()].iter().zip(&mut self.changes[rows]) {
+                    let (value, slope) = (dot(&limit.row, &jet), dot(&limit.row, &by));
+                    for (side, sign) in [1.0, -1.0].into_iter().enumerate() {
+                        let (now, inverse) = ((limit.slack[side], limit.dual[side]), change.slack[side]);
+                        let (slack, dual) =
+                            changed(now, inverse, sign * value - most, sign * slope + falls, mu);
+                        far = nearer(far, now.0, slack);
+                        far_dual = nearer(far_dual, now.1, dual);
+                        (change.slack[side], change.dual[side]) = (slack, dual);
+                    }
                 }
-                changes.push(change);
             }
         }
         for (at, _, basis) in &self.times {
             let by = dot(basis, &[direction[*at], direction[at + 1], direction[at + 2]]);
             far = nearer(far, self.value(*at, basis), by);
         }
-        for (control, by) in self.control.iter_mut().zip(&direction) {
+        self.go(far, far_dual, &direction);
+        self.right = direction;
+    }
+
+    /// So far along the direction, and along what it changes.
+    fn go(&mut self, far: f64, far_dual: f64, direction: &[f64]) {
+        for (control, by) in self.control.iter_mut().zip(direction) {
             *control += far * by;
         }
-        for (top, by) in self.tops.iter_mut().zip(tops) {
+        for (top, by) in self.tops.iter_mut().zip(&self.top_changes) {
             *top = (top.0 + far * by.0, top.1 + far_dual * by.1);
         }
-        for (limit, change) in self.limits.iter_mut().zip(changes) {
+        for (limit, change) in self.limits.iter_mut().zip(&self.changes) {
             for side in [0, 1] {
-                limit.slack[side] += far * change[side].0;
-                limit.dual[side] += far_dual * change[side].1;
+                limit.slack[side] += far * change.slack[side];
+                limit.dual[side] += far_dual * change.dual[side];
             }
         }
-        self.right = direction;
     }
 }
 
@@ -365,45 +376,10 @@ fn zigzag_s(way: &Way, wanted: &PathSpeed) -> f64 {
     0.5 * joints.fold(wanted.acceleration / wanted.jerk, f64::min)
 }
 
+/// A limit that is never used beyond this share by what the others leave is left out.
+const REDUNDANT: f64 = 0.999;
 /// How much of the last gap the next step aims at.
 const CENTRE: f64 = 0.15;
-
-/// The change of slack and dual of one limit whose value is `value` and changes by `by`.
-fn changed((slack, dual): (f64, f64), value: f64, by: f64, mu: f64) -> (f64, f64) {
-    let slack_by = -(value + slack) - by;
-    (slack_by, mu / slack - dual - dual / slack * slack_by)
-}
-
-/// The part of a step that keeps `value` above zero.
-fn nearer(far: f64, value: f64, by: f64) -> f64 {
-    if by < 0.0 { far.min(-CLOSE * value / by) } else { far }
-}
-
-fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn outer(row: &[f64; 3], weight: f64) -> [[f64; 3]; 3] {
-    row.map(|a| row.map(|b| weight * a * b))
-}
-
-/// The square form (its upper half) on `(b, b', b'')` as one on the three unknowns.
-fn turned(square: &[[f64; 3]; 3], basis: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
-    let full = |i: usize, k: usize| if i <= k { square[i][k] } else { square[k][i] };
-    let mut half = [[0.0; 3]; 3];
-    for (i, row) in half.iter_mut().enumerate() {
-        for (k, value) in row.iter_mut().enumerate() {
-            *value = full(i, 0) * basis[0][k] + full(i, 1) * basis[1][k] + full(i, 2) * basis[2][k];
-        }
-    }
-    let mut block = [[0.0; 3]; 3];
-    for (i, row) in block.iter_mut().enumerate() {
-        for (k, value) in row.iter_mut().enumerate() {
-            *value = basis[0][i] * half[0][k] + basis[1][i] * half[1][k] + basis[2][i] * half[2][k];
-        }
-    }
-    block
-}
 
 /// `b`, `b'` and `b''` at `right` into a cell, from its three control points.
 pub(super) fn basis(nodes: &[f64], cell: usize, right: f64) -> [[f64; 3]; 3] {
