@@ -1,5 +1,5 @@
 //! What is read from outside, on millions of damaged streams from a seed: the checks of the fuzz targets, in every run.
-#![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test stops at the first surprise")]
 
 use std::path::Path;
 
@@ -106,7 +106,8 @@ fn dashboard_lines() {
 fn scripts_of_a_controller() {
     let ours = Path::new(env!("CARGO_MANIFEST_DIR")).join("robot/src/drivers/ur/probepath.script");
     let text = std::fs::read_to_string(ours).unwrap();
-    let filled = ["WATCHDOG_TICKS", "WATCHDOG_HZ", "LOOKAHEAD_S", "GAIN", "MASS_KG", "COG_X_M", "COG_Y_M", "COG_Z_M"];
+    let filled =
+        ["WATCHDOG_TICKS", "WATCHDOG_HZ", "LOOKAHEAD_S", "GAIN", "MASS_KG", "COG_X_M", "COG_Y_M", "COG_Z_M"];
     let text = filled.iter().fold(text, |text, name| text.replace(&format!("{{{name}}}"), "25"));
     assert!(Parameters::read(&text).is_some());
     let theirs = b"def rtde_control():\n  sync()\nend\n".to_vec();

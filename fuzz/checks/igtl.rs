@@ -21,7 +21,11 @@ pub fn check(bytes: &[u8]) {
     assert_eq!(messages, decode(bytes, bytes.len().max(1)));
     for message in messages {
         let Message::Image(header, image) = message else { continue };
-        let Ok(written) = encode_image(&header.device, header.id, header.stamp.nanoseconds(), &image) else { continue };
-        assert!(matches!(&decode(&written, 7)[..], [Message::Image(_, again)] if again.pixels == image.pixels));
+        let Ok(written) = encode_image(&header.device, header.id, header.stamp.nanoseconds(), &image) else {
+            continue;
+        };
+        assert!(
+            matches!(&decode(&written, 7)[..], [Message::Image(_, again)] if again.pixels == image.pixels)
+        );
     }
 }

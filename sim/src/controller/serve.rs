@@ -12,9 +12,7 @@ use std::net::{IpAddr, Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::JoinHandle;
-use std::time::Instant;
 
-use probepath_frames::Span;
 use probepath_robot::realtime::{Grant, Histogram, Rank, take_rank};
 
 use super::core::Controller;
@@ -200,11 +198,6 @@ fn accept(server: &Arc<Server>, listener: &TcpListener, what: &'static str, serv
         // A thread that cannot be had costs this connection, not the others: the socket closes.
         let _ = spawn(what, move || serve(&serving, socket));
     }
-}
-
-fn since(due: Instant) -> Span {
-    let late = Instant::now().saturating_duration_since(due);
-    Span::from_nanoseconds(i64::try_from(late.as_nanos()).unwrap_or(i64::MAX))
 }
 
 fn spawn(name: &str, work: impl FnOnce() + Send + 'static) -> Result<JoinHandle<()>, ControllerError> {

@@ -4,7 +4,7 @@
 //! `q''` 1, `b` 2. A polynomial lies between its Bernstein coefficients, so their largest bounds it everywhere.
 
 use super::profile::{Cell, Profile};
-use super::way::{Row, Way};
+use super::way::{Row, Slopes, Way};
 use super::{MotionBounds, PathSpeed};
 
 /// The shares of velocity, acceleration and jerk that each cell uses at most.
@@ -12,6 +12,9 @@ pub(super) fn used(way: &Way, profile: &Profile, wanted: &PathSpeed) -> Vec<Moti
     let ends = profile.cells.iter().skip(1).map(|c| c.place).chain([profile.length]);
     let step = way.step();
     let mut piece = 0;
+    // q' and q'' where the last part ended, which are those where the next one begins.
+    let [first, second, _] = way.on(0, 0.0);
+    let mut here = [first, second];
     // A launch ends with the acceleration that the next cell begins with.
     let nexts = profile.cells.iter().skip(1).map(|c| c.acceleration).chain([0.0]);
     let each = profile.cells.iter().zip(ends).zip(nexts).map(|((cell, end), next)| {
@@ -24,8 +27,9 @@ pub(super) fn used(way: &Way, profile: &Profile, wanted: &PathSpeed) -> Vec<Moti
             }
             let next = if piece + 1 < way.pieces() { step * (piece + 1) as f64 } else { f64::INFINITY };
             let until = end.min(next);
-            most = most.max(&part(way, wanted, (cell, peak), piece, [from, until]));
-            from = until;
+            let there = way.on(piece, until - step * piece as f64);
+            most = most.max(&part(way, wanted, (cell, peak), (&here, &there), [from, until]));
+            (here, from) = ([there[0], there[1]], until);
         }
         most
     });
@@ -46,15 +50,13 @@ fn part(
     way: &Way,
     wanted: &PathSpeed,
     (cell, peak): (&Cell, f64),
-    piece: usize,
+    (left, right): (&[Row; 2], &Slopes),
     [from, until]: [f64; 2],
 ) -> MotionBounds {
-    let begin = way.step() * piece as f64;
-    let (left, right) = (way.on(piece, from - begin), way.on(piece, until - begin));
     let length = until - from;
     // q' as Bernstein coefficients.
     let first = [left[0], left[0] + left[1] * (0.5 * length), right[0]];
-    let (second, third) = ([left[1], right[1]], left[2]);
+    let (second, third) = ([left[1], right[1]], right[2]);
     if cell.jerk.abs() > 0.0 {
         return launched(way, wanted, (cell.jerk.abs(), peak), &first, &second, &third);
     }

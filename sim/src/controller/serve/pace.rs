@@ -8,15 +8,22 @@
 use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
+use probepath_frames::Span;
 use probepath_robot::realtime::{Rank, take_rank};
 
-use super::{Server, World, since};
+use super::{Server, World};
 use crate::controller::Time;
 
 /// A tick in wall time.
 const TICK: Duration = Duration::from_millis(2);
 /// While simulated time stands still, what is known is said again this often, so that nobody who listens waits for ever.
 const AGAIN: Duration = Duration::from_millis(5);
+
+/// How late it is.
+pub(super) fn since(due: Instant) -> Span {
+    let late = Instant::now().saturating_duration_since(due);
+    Span::from_nanoseconds(i64::try_from(late.as_nanos()).unwrap_or(i64::MAX))
+}
 
 /// Ticks until everything stops.
 pub(super) fn run(server: &Arc<Server>) {

@@ -11,7 +11,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::outbox::{Letter, Outbox};
-use super::{Client, Server, World, since, spawn};
+use super::pace::since;
+use super::{Client, Server, World, spawn};
 use crate::controller::session::{Heard, Session};
 
 /// Serves one connection until it ends.
