@@ -86,10 +86,9 @@ impl Scale {
         const STEPS: usize = 96;
         let (low, high) = self.range;
         for i in 0..STEPS {
-            let edge = |i: usize| x + width * i as f64 / STEPS as f64;
             let value = low + (high - low) * (i as f64 + 0.5) / STEPS as f64;
-            // A little over the next, so that no seam shows.
-            let (a, b) = (edge(i), (edge(i + 1) + 0.6).min(x + width));
+            // Each to the bar's end, the next over it: no seam shows.
+            let (a, b) = (x + width * i as f64 / STEPS as f64, x + width);
             drawing.area(&[(a, y), (b, y), (b, y + height), (a, y + height)], self.colour(value), 1.0);
         }
         for (part, value) in [(0.0, low), (0.5, (low + high) / 2.0), (1.0, high)] {

@@ -3,7 +3,7 @@
 
 use probepath_recon::{Mesh, Unrolled, unrolled};
 
-use super::colours::{FAINT, INK, SOFT, Scale};
+use super::colours::{INK, SOFT, Scale};
 use super::curve::nice;
 use super::drawing::Drawing;
 use super::picture::{Anchor, Picture};
@@ -127,7 +127,6 @@ impl ErrorMap<'_> {
             over.line(&[(x, foot), (x, foot + 8.0)], 1.5, SOFT);
             over.text((x, foot + 34.0), &format!("{:.0}", i as f64 * step), LETTERS, Anchor::Middle, SOFT);
         }
-        over.line(&[(MAP.left, SIZE.1 as f64 - 144.0), (right, SIZE.1 as f64 - 144.0)], 0.5, FAINT);
         over.text((MAP.left, foot + 88.0), "along the vessel, mm", LETTERS, Anchor::Start, SOFT);
         let bar = (right - 620.0, foot + 84.0);
         self.scale().bar(&mut over, bar, (620.0, 20.0), self.words(), LETTERS * 0.84);
