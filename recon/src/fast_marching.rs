@@ -37,14 +37,15 @@ impl PartialOrd for Trial {
     }
 }
 
-/// The arrival time of a front in every cell: `|grad T| F = 1`, `T = 0` at the seeds, with `speed` F of each cell.
+/// The arrival time of a front in every cell: `|grad T| F = 1`, `T = 0` at the seeds, with `speed(cell)` F, which is
+/// asked only beside the front.
 /// `go_on(cell, arrival)` is asked as each cell is accepted, in the order of arrival; the march ends when it says
 /// false. Cells never accepted are infinite, as are those of no speed.
 ///
-/// Seeds outside the grid are passed over; a `speed` shorter than the grid reads as zero there.
+/// Seeds outside the grid are passed over.
 pub fn march(
     grid: &MarchGrid,
-    speed: &[f64],
+    mut speed: impl FnMut(usize) -> f64,
     seeds: &[usize],
     mut go_on: impl FnMut(usize, f64) -> bool,
 ) -> Vec<f64> {
@@ -65,8 +66,11 @@ pub fn march(
             break;
         }
         for cell in neighbours(grid, trial.cell) {
-            let f = speed.get(cell).copied().unwrap_or(0.0);
-            if accepted[cell] || f.is_nan() || f <= 0.0 {
+            if accepted[cell] {
+                continue;
+            }
+            let f = speed(cell);
+            if f.is_nan() || f <= 0.0 {
                 continue;
             }
             let time = update(grid, &arrival, &accepted, cell, 1.0 / f);
@@ -130,7 +134,7 @@ mod tests {
     #[test]
     fn the_front_of_a_point_arrives_after_its_distance() {
         let seed = 30 * 81 + 40;
-        let arrival = march(&GRID, &vec![2.0; 81 * 61], &[seed], |_, _| true);
+        let arrival = march(&GRID, |_| 2.0, &[seed], |_, _| true);
         let mut worst: f64 = 0.0;
         for (cell, time) in arrival.iter().enumerate() {
             let (x, y) = ((cell % 81) as f64 - 40.0, (cell / 81) as f64 - 30.0);
@@ -151,7 +155,7 @@ mod tests {
                 0.1 + (state >> 40) as f64 / (1_u64 << 24) as f64
             })
             .collect();
-        let arrival = march(&GRID, &speed, &[100, 3000], |_, _| true);
+        let arrival = march(&GRID, |cell| speed[cell], &[100, 3000], |_, _| true);
         let mut swept = vec![f64::INFINITY; speed.len()];
         (swept[100], swept[3000]) = (0.0, 0.0);
         let all = vec![true; speed.len()];
@@ -171,21 +175,26 @@ mod tests {
         for row in 1..61 {
             speed[row * 81 + 40] = 0.0;
         }
-        let arrival = march(&GRID, &speed, &[30 * 81 + 39], |_, _| true);
+        let arrival = march(&GRID, |cell| speed[cell], &[30 * 81 + 39], |_, _| true);
         assert!(arrival[30 * 81 + 40].is_infinite());
         assert!(arrival[30 * 81 + 41] > 14.0, "{}", arrival[30 * 81 + 41]);
         let mut last = 0.0;
-        let ended = march(&GRID, &speed, &[30 * 81 + 39], |_, time| {
-            assert!(time >= last, "arrivals come in order");
-            last = time;
-            time < 3.0
-        });
+        let ended = march(
+            &GRID,
+            |cell| speed[cell],
+            &[30 * 81 + 39],
+            |_, time| {
+                assert!(time >= last, "arrivals come in order");
+                last = time;
+                time < 3.0
+            },
+        );
         assert!(ended.iter().all(|&time| time <= last || time.is_infinite()));
     }
 
     #[test]
     fn a_seed_off_the_grid_and_a_speed_that_is_not_a_number_reach_nothing() {
-        let arrival = march(&GRID, &[f64::NAN; 81 * 61], &[1_000_000, 5], |_, _| true);
+        let arrival = march(&GRID, |_| f64::NAN, &[1_000_000, 5], |_, _| true);
         assert_eq!(arrival.iter().filter(|time| time.is_finite()).count(), 1);
     }
 }

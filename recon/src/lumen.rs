@@ -10,6 +10,7 @@ mod region;
 mod seed;
 mod track;
 
+use probepath_frames::{Point, World};
 use probepath_us_capture::PlacedBScan;
 use rayon::prelude::*;
 
@@ -18,7 +19,7 @@ pub(crate) use contour::area_and_centre;
 pub use finder::{LumenFinder, Tracker};
 pub use refusal::NoLumen;
 
-use crate::patch::{Patch, PowerOfGrey};
+use crate::patch::PowerOfGrey;
 use crate::settings::FWHM;
 use crate::{LumenSettings, SeedPoint};
 use contour::Uncertainty;
@@ -44,11 +45,7 @@ pub fn segment(images: &[PlacedBScan], settings: &LumenSettings) -> Vec<ImageLum
     let table = PowerOfGrey::new(settings.dynamic_range_db);
     let look = Look { table: &table, settings };
     let mut regions = track::follow(images, &table, settings);
-    let fit = |(image, region): (&PlacedBScan, &Result<Region, NoLumen>)| {
-        let region = region.as_ref().map_err(|why| *why)?;
-        look.fitted(image, region, &Plane::ITSELF, None)
-    };
-    let mut borders: Vec<Result<Border, NoLumen>> = images.par_iter().zip(&regions).map(fit).collect();
+    let mut borders = first_borders(images, &regions, &look);
     again::second_look(images, &look, &mut regions, &mut borders);
     for _ in 0..PASSES {
         let planes = beam::planes(images, &borders, &settings.point_spread);
@@ -73,8 +70,41 @@ pub fn segment(images: &[PlacedBScan], settings: &LumenSettings) -> Vec<ImageLum
     .collect()
 }
 
+/// Images that are fitted one after the other, each from where the one before ended.
+const RUN: usize = 16;
+/// Regions this near to each other (m) are of one place.
+const BESIDE_M: f64 = 1.0e-3;
+
+/// The wall round every region, the beam's thickness not thought of yet.
+fn first_borders(
+    images: &[PlacedBScan],
+    regions: &[Result<Region, NoLumen>],
+    look: &Look<'_>,
+) -> Vec<Result<Border, NoLumen>> {
+    let run = |(images, regions): (&[PlacedBScan], &[Result<Region, NoLumen>])| {
+        let mut last: Option<(Point<World>, Border)> = None;
+        let mut borders = Vec::with_capacity(images.len());
+        for (image, region) in images.iter().zip(regions) {
+            let border = region.as_ref().map_err(|why| *why).and_then(|region| {
+                let centre = image.world_from_image * Point::new(region.centre.0, region.centre.1, 0.0);
+                let beside = last.as_ref().filter(|last| last.0.distance(&centre) < BESIDE_M);
+                let warm = beside.and_then(|(_, from)| {
+                    let border = look.fitted(image, region, &Plane::ITSELF, Some(from)).ok()?;
+                    look.accepted(image, &border, region).is_ok().then_some(border)
+                });
+                let border = warm.map_or_else(|| look.fitted(image, region, &Plane::ITSELF, None), Ok)?;
+                last = Some((centre, border.clone()));
+                Ok(border)
+            });
+            borders.push(border);
+        }
+        borders
+    };
+    images.par_chunks(RUN).zip(regions.par_chunks(RUN)).flat_map_iter(run).collect()
+}
+
 /// How often the wall is fitted again with what the neighbouring images say about the beam's thickness.
-const PASSES: usize = 2;
+const PASSES: usize = 1;
 
 /// What every fit needs.
 struct Look<'a> {
@@ -102,12 +132,8 @@ impl Look<'_> {
         let spread = &self.settings.point_spread;
         let sigma = (spread.lateral_m(depth, setting) / FWHM, spread.axial_fwhm_m / FWHM);
         let wall = self.settings.wall_thickness_m;
-        let far = region.radii.iter().copied().fold(0.0, f64::max) + wall + 2.0e-3;
-        let half = (far + 2.0 * sigma.0, far + 2.0 * sigma.1);
-        let outside = NoLumen::OutsidePicture { x_mm: region.centre.0 * 1e3, y_mm: region.centre.1 * 1e3 };
-        let patch = Patch::around(&image.bscan, self.table, region.centre, half, (0.25e-3, 0.125e-3));
-        let patch = &patch.ok_or(outside)?;
-        fit::fit(&FitInput { patch, region, sigma, wall, planes, earlier })
+        let (bscan, table) = (&image.bscan, self.table);
+        fit::fit(&FitInput { bscan, table, region, sigma, sigma_sd: 0.1, wall, planes, earlier })
     }
 
     /// The contour of a border that is one of a lumen.
@@ -124,9 +150,16 @@ impl Look<'_> {
         if border.contrast_db < 6.0 {
             return Err(NoLumen::NoContrast { contrast_db: border.contrast_db });
         }
+        let sd_mm = contour.points_sd_mm.iter().copied().fold(0.0, f64::max);
+        if sd_mm > MOST_UNSURE_MM + 0.1 * radius {
+            return Err(NoLumen::Unsure { sd_mm });
+        }
         Ok(contour)
     }
 }
+
+/// A border that is less sure than this (mm), and a tenth of the radius, somewhere is not given.
+const MOST_UNSURE_MM: f64 = 0.3;
 
 fn contour(image: &PlacedBScan, border: &Border, region: &Region) -> Contour {
     let places = border.contour();

@@ -30,6 +30,53 @@ pub struct Phantom {
     pub oval: (f64, f64),
     /// Seed of the speckle.
     pub seed: u64,
+    /// How far the axis lies off the picture's middle at x = 0.
+    pub across: f64,
+    /// How the axis runs aside, for each mm along x: across and deep.
+    pub slope: (f64, f64),
+    /// Overall gain (dB).
+    pub gain_db: f64,
+    /// Columns (mm from the middle) that lie in a shadow from a depth on, and what is lost there (dB).
+    pub shadow: Option<Shadow>,
+    /// Depths, thicknesses and echo amplitudes of bands that the machine draws over everything.
+    pub bands: Vec<(f64, f64, f64)>,
+    /// A vein.
+    pub vein: Option<Vein>,
+    /// A branch of the artery.
+    pub branch: Option<Branch>,
+}
+
+/// A sector that echoes do not come back from.
+#[derive(Clone, Copy, Debug)]
+pub struct Shadow {
+    /// Between these places across.
+    pub across: (f64, f64),
+    /// Below this depth.
+    pub below: f64,
+    /// What is lost (dB).
+    pub loss_db: f64,
+}
+
+/// A vein beside the artery, along it. It has a wall of its own.
+#[derive(Clone, Copy, Debug)]
+pub struct Vein {
+    /// From the artery's axis: across and deep.
+    pub off: (f64, f64),
+    /// Its radius.
+    pub radius: f64,
+    /// Thickness and echo amplitude of its wall.
+    pub wall: (f64, f64),
+}
+
+/// A branch that leaves the axis.
+#[derive(Clone, Copy, Debug)]
+pub struct Branch {
+    /// Where along x.
+    pub at: f64,
+    /// How fast it runs aside: across and deep for each mm along x.
+    pub slope: (f64, f64),
+    /// Its radius.
+    pub radius: f64,
 }
 
 impl Default for Phantom {
@@ -46,6 +93,13 @@ impl Default for Phantom {
             spread: (0.35, 1.69, 3.0),
             oval: (1.0, 1.0),
             seed: 1,
+            across: 0.0,
+            slope: (0.0, 0.0),
+            gain_db: 0.0,
+            shadow: None,
+            bands: Vec::new(),
+            vein: None,
+            branch: None,
         }
     }
 }
@@ -97,25 +151,54 @@ impl Phantom {
         }
     }
 
+    /// Distance from the artery's border, positive outside (mm); straight vessels only are exact.
+    pub fn distance(&self, x: f64, across: f64, depth: f64) -> f64 {
+        let place = Vector3::new(x, across - self.across, depth - self.depth);
+        let main = off_line(place, self.slope);
+        let round = (main.y / self.oval.0).hypot(main.z / self.oval.1).hypot(main.x);
+        let own = round - self.radius_at(x);
+        match self.branch {
+            Some(branch) if x > branch.at => {
+                let from = place - Vector3::new(branch.at, 0.0, 0.0);
+                own.min(off_line(from, branch.slope).norm() - branch.radius)
+            }
+            _ => own,
+        }
+    }
+
+    /// The amplitude of the echo at a place.
+    fn echo(&self, x: f64, across: f64, depth: f64) -> f64 {
+        let artery = self.distance(x, across, depth);
+        if artery < 0.0 {
+            return self.echoes.0;
+        }
+        if artery < self.wall {
+            return self.echoes.1;
+        }
+        let Some(vein) = self.vein else { return self.echoes.2 };
+        let off = (across - self.across - vein.off.0).hypot(depth - self.depth - vein.off.1) - vein.radius;
+        match off {
+            off if off < 0.0 => self.echoes.0,
+            off if off < vein.wall.0 => vein.wall.1,
+            _ => self.echoes.2,
+        }
+    }
+
     /// The square of the echo, averaged over five planes across the beam, at `across`, `depth` mm.
     fn echo_power(&self, x: f64, across: f64, depth: f64) -> f64 {
         // Amplitudes add up, so it is the squared profile that weighs the power.
         let sigma = self.spread.2 / 2.3548 / 2_f64.sqrt();
-        let at = (across / self.oval.0).hypot((depth - self.depth) / self.oval.1);
         let (mut sum, mut weights) = (0.0, 0.0);
         for plane in -2..=2 {
             let offset = f64::from(plane);
             let weight = (-offset * offset / 2.0).exp();
-            let radius = self.radius_at(x + offset * sigma);
-            let echo = match at - radius {
-                r if r < 0.0 => self.echoes.0,
-                r if r < self.wall => self.echoes.1,
-                _ => self.echoes.2,
-            };
-            sum += weight * echo * echo;
+            sum += weight * self.echo(x + offset * sigma, across, depth).powi(2);
             weights += weight;
         }
-        sum / weights
+        let bands = self.bands.iter().filter(|band| (depth - band.0).abs() < band.1 / 2.0);
+        let shadow = self.shadow.filter(|s| depth > s.below && (s.across.0..s.across.1).contains(&across));
+        let kept = shadow.map_or(1.0, |shadow| 10_f64.powf(-shadow.loss_db / 10.0));
+        (sum / weights + bands.map(|band| band.2 * band.2).sum::<f64>()) * kept
     }
 
     /// The B-scan at `x` mm along the vessel, as it lies in the World: x of the image across the vessel.
@@ -146,9 +229,16 @@ impl Phantom {
         let noise = 10_f64.powf(self.noise_db / 20.0);
         let (a, b) = dice.normal_pair();
         // Amplitude 1 of the echo is -12 dB of the range, which leaves room for bright speckle.
-        let envelope = (re + a * noise).hypot(im + b * noise) / 2_f64.sqrt() * 0.25;
+        let gain = 10_f64.powf(self.gain_db / 20.0);
+        let envelope = gain * (re + a * noise).hypot(im + b * noise) / 2_f64.sqrt() * 0.25;
         ((20.0 * envelope.max(1e-9).log10() + 60.0) / 60.0 * 255.0).round().clamp(0.0, 255.0) as u8
     }
+}
+
+/// What of a place is off a line through the origin along (1, slope).
+fn off_line(place: Vector3<f64>, slope: (f64, f64)) -> Vector3<f64> {
+    let along = Vector3::new(1.0, slope.0, slope.1).normalize();
+    place - along * place.dot(&along)
 }
 
 /// An image plane at `x` mm with its columns across (World -y to y) and its rows along World z, depth downward.

@@ -19,11 +19,23 @@ const REACH_M: f64 = 4.5e-3;
 /// Planes, and how far apart they are in standard deviations.
 const PLANES: i32 = 4;
 const STEP: f64 = 0.6;
+/// Images that are looked at on either side: an arm that stands still makes very many of one place.
+const MOST_NEAR: usize = 200;
 
-/// Where a contour lies.
-struct Section {
-    centre: Vector3<f64>,
-    radius: f64,
+/// Where a border lies: the centre in the World, and the radius of the circle of its mean square (m).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Section {
+    pub(crate) centre: Vector3<f64>,
+    pub(crate) radius: f64,
+}
+
+impl Section {
+    pub(crate) fn of(image: &PlacedBScan, border: &Border) -> Self {
+        let (_, (x, y)) = super::area_and_centre(&border.contour());
+        let square = (0..RAYS).map(|ray| border.radius(angle(ray)).powi(2)).sum::<f64>() / RAYS as f64;
+        let centre = image.world_from_image * Point::new(x, y, 0.0);
+        Self { centre: centre.vector(), radius: square.sqrt() }
+    }
 }
 
 /// The planes of every image's beam.
@@ -32,19 +44,14 @@ pub(crate) fn planes(
     borders: &[Result<Border, NoLumen>],
     spread: &PointSpread,
 ) -> Vec<Vec<Plane>> {
-    let sections: Vec<Option<Section>> = images.iter().zip(borders).map(|(i, b)| section(i, b)).collect();
-    (0..images.len()).into_par_iter().map(|index| of_image(index, images, &sections, spread)).collect()
+    let section = |(image, border): (&PlacedBScan, &Result<Border, NoLumen>)| {
+        border.as_ref().ok().map(|border| Section::of(image, border))
+    };
+    let sections: Vec<Option<Section>> = images.par_iter().zip(borders).map(section).collect();
+    (0..images.len()).into_par_iter().map(|index| of_index(index, images, &sections, spread)).collect()
 }
 
-fn section(image: &PlacedBScan, border: &Result<Border, NoLumen>) -> Option<Section> {
-    let border = border.as_ref().ok()?;
-    let (_, centre) = super::area_and_centre(&border.contour());
-    let square = (0..RAYS).map(|ray| border.radius(angle(ray)).powi(2)).sum::<f64>() / RAYS as f64;
-    let centre = image.world_from_image * Point::new(centre.0, centre.1, 0.0);
-    Some(Section { centre: centre.vector(), radius: square.sqrt() })
-}
-
-fn of_image(
+fn of_index(
     index: usize,
     images: &[PlacedBScan],
     sections: &[Option<Section>],
@@ -53,9 +60,28 @@ fn of_image(
     let Some((image, Some(own))) = images.get(index).zip(sections.get(index)) else {
         return Plane::ITSELF.to_vec();
     };
+    // A sweep goes on: beyond the first section that is far away, none is near.
+    let image_from_world = image.world_from_image.inverse();
+    let near = |section: &&Section| {
+        let offset = (image_from_world * Point::from_vector(section.centre)).vector();
+        offset.z.abs() < 1.5 * REACH_M
+    };
+    let (before, after) = sections.split_at(index);
+    let before = before.iter().rev().flatten().take(MOST_NEAR).take_while(near);
+    let after = after.iter().flatten().take(MOST_NEAR).take_while(near);
+    of_image(image, own, before.chain(after), spread)
+}
+
+/// The planes of the beam of an image whose own section is known, or at least expected.
+pub(crate) fn of_image<'a>(
+    image: &PlacedBScan,
+    own: &Section,
+    others: impl Iterator<Item = &'a Section>,
+    spread: &PointSpread,
+) -> Vec<Plane> {
     let image_from_world = image.world_from_image.inverse();
     let here = (image_from_world * Point::from_vector(own.centre)).vector();
-    let near = sections.iter().flatten().filter_map(|other| {
+    let near = others.filter_map(|other| {
         let offset = (image_from_world * Point::from_vector(other.centre)).vector() - here;
         let close = offset.z.abs() < REACH_M && offset.norm() < 2.0 * REACH_M;
         close.then(|| (offset.z, Vector3::new(offset.x, offset.y, other.radius)))
@@ -77,7 +103,7 @@ fn of_image(
 }
 
 /// First and second derivative at zero of what is `(place, value)`, by weighted least squares; nothing when the
-/// places are too few or too close to say.
+/// places are too few or too close to say. From one side only, the slope: a bend would be guessed.
 fn local_quadratic(values: impl Iterator<Item = (f64, Vector3<f64>)>) -> Option<[Vector3<f64>; 2]> {
     let mut matrix = Matrix3::zeros();
     let mut right = Matrix3::zeros();
@@ -89,11 +115,12 @@ fn local_quadratic(values: impl Iterator<Item = (f64, Vector3<f64>)>) -> Option<
         right += row * value.transpose() * weight;
         (below, above, count) = (below.min(z), above.max(z), count + 1);
     }
-    if count < 4 || below > -0.5 * NEAR_M || above < 0.5 * NEAR_M {
+    if count < 4 || above - below < NEAR_M {
         return None;
     }
+    let both_sides = below < -0.5 * NEAR_M && above > 0.5 * NEAR_M;
     // A little stiffness, so that two clusters of images do not make a bend.
-    matrix[(2, 2)] += 0.05 * matrix[(0, 0)];
+    matrix[(2, 2)] += matrix[(0, 0)] * if both_sides { 0.05 } else { 100.0 };
     let solved = matrix.cholesky()?.solve(&right);
     Some([solved.row(1).transpose() / NEAR_M, solved.row(2).transpose() / (NEAR_M * NEAR_M)])
 }

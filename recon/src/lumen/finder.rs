@@ -1,9 +1,14 @@
 //! [`LumenFinder`]: whatever finds the lumen in images as they come.
 
+use std::collections::VecDeque;
+
 use nalgebra::Vector3;
+use probepath_frames::Point;
 use probepath_us_capture::PlacedBScan;
 
-use super::{ImageLumen, Look, Plane, track};
+use super::beam::{self, Section};
+use super::region::Region;
+use super::{Border, Contour, ImageLumen, Look, NoLumen, Plane, track};
 use crate::LumenSettings;
 use crate::patch::PowerOfGrey;
 
@@ -44,7 +49,7 @@ pub trait LumenFinder: Send {
 pub struct Tracker {
     table: PowerOfGrey,
     settings: LumenSettings,
-    trail: Vec<Vector3<f64>>,
+    main: Followed,
     first: bool,
 }
 
@@ -52,7 +57,7 @@ impl Tracker {
     /// Before the first image.
     pub fn new(settings: LumenSettings) -> Self {
         let table = PowerOfGrey::new(settings.dynamic_range_db);
-        Self { table, settings, trail: Vec::new(), first: true }
+        Self { table, settings, main: Followed::default(), first: true }
     }
 }
 
@@ -61,15 +66,72 @@ impl LumenFinder for Tracker {
         let look = Look { table: &self.table, settings: &self.settings };
         let given = self.settings.seed.filter(|_| self.first).map(|seed| seed.place(image));
         self.first = false;
-        let lumen =
-            track::region(image, &self.table, &self.settings, &self.trail, given).and_then(|region| {
-                let border = look.fitted(image, &region, &Plane::ITSELF, None)?;
-                look.accepted(image, &border, &region)
-            });
-        if let Ok(contour) = &lumen {
-            self.trail.push(contour.centre.vector());
-        }
+        let region = track::region(image, &self.table, &self.settings, &self.main.trail, given);
+        let lumen = region.and_then(|region| self.main.contour(image, &region, &look));
         ImageLumen { number: image.bscan.number, lumen, others: Vec::new() }
+    }
+}
+
+/// Sections are remembered over more than the beam's thickness.
+const REMEMBERED: usize = 100;
+/// A border this near to the last one (m) begins where that ended.
+const BESIDE_M: f64 = 1.5e-3;
+/// A trail is a place each (m), however slow the sweep.
+const TRAIL_STEP_M: f64 = 0.05e-3;
+
+/// A vessel that is followed: what was seen of it so far.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Followed {
+    pub(super) trail: Vec<Vector3<f64>>,
+    sections: VecDeque<Section>,
+    last: Option<Border>,
+}
+
+impl Followed {
+    /// The contour round a region, with the beam as the images so far let expect it.
+    pub(super) fn contour(
+        &mut self,
+        image: &PlacedBScan,
+        region: &Region,
+        look: &Look<'_>,
+    ) -> Result<Contour, NoLumen> {
+        let centre = image.world_from_image * Point::new(region.centre.0, region.centre.1, 0.0);
+        let beside = |section: &&Section| (section.centre - centre.vector()).norm() < BESIDE_M;
+        let found = match (self.sections.front().filter(beside), &self.last) {
+            (Some(section), Some(last)) => {
+                let own = Section { centre: centre.vector(), radius: section.radius };
+                let planes = beam::of_image(image, &own, self.sections.iter(), &look.settings.point_spread);
+                self.walled(image, region, look, (&planes, Some(last)))
+            }
+            _ => Err(NoLumen::Unsettled),
+        };
+        let (border, contour) =
+            found.or_else(|_| self.walled(image, region, look, (&Plane::ITSELF, None)))?;
+        self.remember(image, border);
+        Ok(contour)
+    }
+
+    fn walled(
+        &self,
+        image: &PlacedBScan,
+        region: &Region,
+        look: &Look<'_>,
+        (planes, last): (&[Plane], Option<&Border>),
+    ) -> Result<(Border, Contour), NoLumen> {
+        let border = look.fitted(image, region, planes, last)?;
+        let contour = look.accepted(image, &border, region)?;
+        Ok((border, contour))
+    }
+
+    fn remember(&mut self, image: &PlacedBScan, border: Border) {
+        let section = Section::of(image, &border);
+        let moved = |last: &Vector3<f64>| (last - section.centre).norm() > TRAIL_STEP_M;
+        if self.trail.last().is_none_or(moved) {
+            self.trail.push(section.centre);
+        }
+        self.sections.push_front(section);
+        self.sections.truncate(REMEMBERED);
+        self.last = Some(border);
     }
 }
 

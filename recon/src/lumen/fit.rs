@@ -4,40 +4,70 @@
 //! the point spread. So a lumen with border `r(theta)`, a wall of some thickness round it and tissue outside predict
 //! the mean power of every cell, and the border is found where prediction and image agree best (Fisher scoring;
 //! the standard deviation of exponential speckle is its mean). Nothing is fitted to one model of the wall: its
-//! brightness, how that changes round the vessel, its thickness, the tissue's and the lumen's brightness are unknowns too.
+//! brightness, how that changes round the vessel, its thickness, the tissue's and the lumen's brightness are unknowns
+//! too. Where no wall is seen, the image is not asked, and the border's smoothness says where it runs.
+//!
+//! The prediction is exact on its cells; its derivatives take every cell's own direction for the direction its echoes
+//! come from, which makes five fields do for 23 unknowns. Where the steps end that plays no part: what ends is the
+//! residual.
 
-use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+mod equations;
+mod fields;
+mod lattice;
+mod sight;
+mod steps;
+
+use nalgebra::{SMatrix, SVector};
+use probepath_us_capture::BScan;
 
 use super::NoLumen;
 use super::region::{RAYS, Region, angle};
-use crate::patch::{Blur, Patch};
+use crate::patch::PowerOfGrey;
+use equations::{GainStep, Gains, Matrix, RADIUS, Residual, SPANS, UNKNOWNS, Vector, Weights, equations};
+use fields::{BY_THICKNESS, Fields, LUMEN, Scene, TISSUE, WALL};
+use lattice::{BINS, Lattice, Wanted, direction};
+use sight::Sight;
+use steps::Steps;
 
 /// Harmonics of the border.
 pub(crate) const HARMONICS: usize = 5;
 const BORDER: usize = 2 * HARMONICS + 1;
-/// Harmonics of the wall's brightness: it is dimmer where the beam runs along it.
+/// Harmonics of the wall's and the tissue's brightness: they are dimmer where the beam runs along them.
 const SHADE: usize = 5;
-const TISSUE: usize = BORDER + SHADE;
-const SLOPE: usize = TISSUE + 1;
-const LUMEN: usize = TISSUE + 2;
-const THICKNESS: usize = TISSUE + 3;
-const UNKNOWNS: usize = TISSUE + 4;
-/// How well the point spread is known, relative to itself; what it is off moves the border by about as much.
-const SPREAD_SD: f64 = 0.1;
+/// Where the other unknowns begin: logarithms of powers, and of the wall's thickness.
+const SHADES: usize = SPANS[WALL].0;
+const TISSUES: usize = SPANS[TISSUE].0;
+const BLOOD: usize = SPANS[LUMEN].0;
+const THICKNESS: usize = SPANS[BY_THICKNESS].0;
+
+/// How far outside the wall the image is asked (m).
+const BEYOND_M: f64 = 1.2e-3;
+/// Cells are this large, in standard deviations of the point spread's power along x and y.
+const CELL: (f64, f64) = (0.8, 1.2);
+/// Steps end when no harmonic moves farther (m), or after so many. Directions are tabulated, so that harmonics sway by
+/// some 10 um in the end; speckle moves them by five times that.
+const SETTLED_M: f64 = 20e-6;
+const MOST_STEPS: usize = 8;
+
+/// Covariance of the border's harmonics (m2).
+type Harmonics = SMatrix<f64, BORDER, BORDER>;
 
 /// What the fit is told.
 pub(crate) struct FitInput<'a> {
-    /// Power round the lumen.
-    pub(crate) patch: &'a Patch,
+    /// The image, and what its grey levels stand for.
+    pub(crate) bscan: &'a BScan,
+    pub(crate) table: &'a PowerOfGrey,
     /// Where the lumen is.
     pub(crate) region: &'a Region,
-    /// Standard deviations of the point spread's amplitude along x and y (m).
+    /// Standard deviations of the point spread's amplitude along x and y (m), and how well they are known, as a part
+    /// of themselves.
     pub(crate) sigma: (f64, f64),
+    pub(crate) sigma_sd: f64,
     /// What the wall's thickness is likely to be (m).
     pub(crate) wall: f64,
     /// What the beam's thickness takes in.
     pub(crate) planes: &'a [Plane],
-    /// An earlier fit of the same region, to go on from.
+    /// A fit of the same lumen to go on from: in this image, or the one beside it.
     pub(crate) earlier: Option<&'a Border>,
 }
 
@@ -62,13 +92,13 @@ impl Plane {
 pub(crate) struct Border {
     /// What the harmonics are about.
     pub(crate) centre: (f64, f64),
-    harmonics: [f64; BORDER],
-    unknowns: DVector<f64>,
-    /// Standard deviation of the border's place, mean over the circumference (m).
+    unknowns: Vector,
+    gains: Gains,
+    /// Standard deviation of the mean radius (m).
     pub(crate) sd: f64,
     /// Covariance of the harmonics (m2).
-    covariance: SMatrix<f64, BORDER, BORDER>,
-    /// Standard deviation of what an error of the point spread does to the mean radius (m).
+    covariance: Harmonics,
+    /// Standard deviation of what an error of the point spread does to the border (m).
     pub(crate) common_sd: f64,
     /// Part of the circumference where a wall is seen (0 to 1).
     pub(crate) walled: f64,
@@ -81,7 +111,7 @@ pub(crate) struct Border {
 impl Border {
     /// Distance from the centre in a direction (m).
     pub(crate) fn radius(&self, theta: f64) -> f64 {
-        basis::<BORDER>(theta).iter().zip(&self.harmonics).map(|(a, b)| a * b).sum()
+        harmonic::<BORDER>(&self.unknowns, RADIUS, theta)
     }
 
     /// Standard deviation of the distance from the centre in a direction (m), along the normal.
@@ -116,161 +146,127 @@ fn basis<const N: usize>(theta: f64) -> [f64; N] {
     out
 }
 
-/// A cell as the model sees it.
-struct Cell {
-    r: f64,
-    depth: f64,
-    border: [f64; BORDER],
-    shade: [f64; SHADE],
-    /// Half the way through the cell in the direction of the ray.
-    half: f64,
-    used: bool,
+/// The sum of `N` harmonics whose coefficients begin at `from`.
+fn harmonic<const N: usize>(unknowns: &Vector, from: usize, theta: f64) -> f64 {
+    basis::<N>(theta).iter().zip(unknowns.rows(from, N).iter()).map(|(a, b)| a * b).sum()
 }
 
-/// The unknowns, their prior, and the cells they predict.
+/// The unknowns, their prior, and what they are held against.
 struct Model<'a> {
     input: &'a FitInput<'a>,
-    cells: Vec<Cell>,
-    unknowns: DVector<f64>,
-    prior: DVector<f64>,
-    prior_sd: DVector<f64>,
-    blur: Blur,
-    /// Independent speckles in a cell.
-    weight: f64,
+    lattice: Lattice,
+    steps: Steps,
+    fields: Fields,
+    sight: Sight,
+    unknowns: Vector,
+    prior: Vector,
+    prior_sd: Vector,
+    weights: Weights,
+    gains: Gains,
 }
 
 /// Fits the border.
 pub(crate) fn fit(input: &FitInput<'_>) -> Result<Border, NoLumen> {
-    let mut model = Model::new(input);
-    let mut normal = None;
-    for _ in 0..15 {
-        let (matrix, gradient) = model.normal_equations();
-        let Some(solved) = matrix.cholesky() else { return Err(NoLumen::Unsettled) };
+    let mut model = Model::new(input)?;
+    for _ in 0..MOST_STEPS {
+        let (matrix, gradient, gains) = model.normal_equations();
+        let solved = matrix.cholesky().ok_or(NoLumen::Unsettled)?;
         let step = limited(solved.solve(&gradient));
-        model.unknowns += &step;
-        normal = Some(solved);
-        if step.rows(0, BORDER).amax() < 3e-6 {
+        model.unknowns += step;
+        model.gains.follow(&step, &gains);
+        if step.rows(RADIUS, BORDER).amax() < SETTLED_M {
             break;
         }
     }
-    let covariance = normal.ok_or(NoLumen::Unsettled)?.inverse();
-    model.border(&covariance).ok_or(NoLumen::Unsettled)
+    model.border().ok_or(NoLumen::Unsettled)
 }
 
 /// A step no larger than the linearisation is good for.
-fn limited(step: DVector<f64>) -> DVector<f64> {
-    let largest = (step.rows(0, BORDER).amax() / 0.4e-3).max(step.rows(BORDER, SHADE + 2).amax() / 1.0);
-    let largest = largest.max(step.rows(LUMEN, 2).amax() / 1.0);
+fn limited(step: Vector) -> Vector {
+    let largest =
+        (step.rows(RADIUS, BORDER).amax() / 0.4e-3).max(step.rows(BORDER, UNKNOWNS - BORDER).amax());
     if largest > 1.0 { step / largest } else { step }
 }
 
 impl<'a> Model<'a> {
-    fn new(input: &'a FitInput<'a>) -> Self {
-        let patch = input.patch;
+    fn new(input: &'a FitInput<'a>) -> Result<Self, NoLumen> {
+        let start: [f64; BINS] = std::array::from_fn(|bin| start_radius(input, direction(bin)));
         let sigma = (input.sigma.0 / 2_f64.sqrt(), input.sigma.1 / 2_f64.sqrt());
-        let in_cells = (sigma.0 / patch.cell.0, sigma.1 / patch.cell.1);
+        let mut lattice = lattice(input, &start, sigma)?;
+        lattice.limit(|bin| start[bin] + input.wall + BEYOND_M);
         let speckle = std::f64::consts::TAU * input.sigma.0 * input.sigma.1;
-        let cells: Vec<Cell> = (0..patch.power.len()).map(|cell| Cell::new(input, cell)).collect();
-        let (prior, prior_sd) = prior(input, &cells);
-        Self {
-            input,
-            cells,
-            unknowns: input.earlier.map_or_else(|| prior.clone(), |border| border.unknowns.clone()),
+        let inside = std::array::from_fn(|bin| (start[bin] - front_to_wall(input, direction(bin))) as f32);
+        let sight = Sight::new(&lattice, &inside);
+        let (prior, prior_sd) = prior(input, &lattice, &start, &sight);
+        Ok(Self {
+            steps: Steps::new(input.planes, lattice.cell),
+            fields: Fields::new(&lattice, sigma),
+            unknowns: input.earlier.map_or(prior, |border| border.unknowns),
             prior,
             prior_sd,
-            blur: Blur::new(patch.columns, patch.rows, in_cells),
-            weight: (patch.cell.0 * patch.cell.1 / speckle).min(1.0),
-        }
-    }
-
-    fn powers(&self, cell: &Cell) -> (f64, f64, f64) {
-        let shade: f64 =
-            cell.shade.iter().zip(self.unknowns.rows(BORDER, SHADE).iter()).map(|(a, b)| a * b).sum();
-        let tissue = self.unknowns[TISSUE] + self.unknowns[SLOPE] * cell.depth * 1e2;
-        (self.unknowns[LUMEN].exp(), shade.exp(), tissue.exp())
-    }
-
-    /// Mean power of every cell, and its derivative by every unknown.
-    fn predict(&mut self) -> (Vec<f64>, Vec<Vec<f64>>) {
-        let count = self.cells.len();
-        let mut power = vec![0.0; count];
-        let mut columns = vec![vec![0.0; count]; UNKNOWNS];
-        let thickness = self.unknowns[THICKNESS].exp();
-        for (i, cell) in self.cells.iter().enumerate() {
-            let (lumen, wall, tissue) = self.powers(cell);
-            let r: f64 = cell.border.iter().zip(self.unknowns.iter()).map(|(a, b)| a * b).sum();
-            let (inner, d_inner) = self.across_the_beam(cell, cell.r - r);
-            let (outer, d_outer) = self.across_the_beam(cell, cell.r - r - thickness);
-            let (w_lumen, w_wall, w_tissue) = (1.0 - inner, inner - outer, outer);
-            power[i] = lumen * w_lumen + wall * w_wall + tissue * w_tissue;
-            let by_outer = -(tissue - wall) * d_outer;
-            let by_r = -(wall - lumen) * d_inner + by_outer;
-            for (column, basis) in columns.iter_mut().zip(&cell.border) {
-                column[i] = by_r * basis;
-            }
-            for (column, basis) in columns[BORDER..].iter_mut().zip(&cell.shade) {
-                column[i] = wall * w_wall * basis;
-            }
-            columns[TISSUE][i] = tissue * w_tissue;
-            columns[SLOPE][i] = tissue * w_tissue * cell.depth * 1e2;
-            columns[LUMEN][i] = lumen * w_lumen;
-            columns[THICKNESS][i] = by_outer * thickness;
-        }
-        let power = self.blur.apply(&power);
-        let columns = columns.iter().map(|column| self.blur.apply(column)).collect();
-        (power, columns)
-    }
-
-    /// A step at `distance` from a border, averaged over the beam's planes.
-    fn across_the_beam(&self, cell: &Cell, distance: f64) -> (f64, f64) {
-        let (cos, sin) = (cell.border[1], cell.border[2]);
-        self.input.planes.iter().fold((0.0, 0.0), |sum, plane| {
-            let moved = plane.wider + plane.shift.0 * cos + plane.shift.1 * sin;
-            let (step, slope) = ramp(distance - moved, cell.half);
-            (sum.0 + plane.weight * step, sum.1 + plane.weight * slope)
+            weights: Weights {
+                speckles: (lattice.cell.0 * lattice.cell.1 / speckle).min(1.0),
+                floor: 0.0,
+                trust: sight.trust,
+            },
+            gains: input.earlier.map_or(Gains::NONE, |border| border.gains.clone()),
+            input,
+            lattice,
+            sight,
         })
     }
 
-    fn normal_equations(&mut self) -> (DMatrix<f64>, DVector<f64>) {
-        let (power, columns) = self.predict();
-        let mut matrix = DMatrix::<f64>::zeros(UNKNOWNS, UNKNOWNS);
-        let mut gradient = DVector::<f64>::zeros(UNKNOWNS);
-        // Deep in the lumen the prediction rests on the point spread's far tails: they weigh little.
-        let floor = 0.03 * self.unknowns[BORDER].exp();
-        for (i, _) in self.cells.iter().enumerate().filter(|(_, cell)| cell.used) {
-            let sd = power[i] + floor;
-            let residual = ((self.input.patch.power[i] - power[i]) / sd).min(6.0);
-            let row: [f64; UNKNOWNS] = std::array::from_fn(|k| columns[k][i] / sd);
-            for (a, &left) in row.iter().enumerate() {
-                gradient[a] += self.weight * left * residual;
-                for (b, &right) in row.iter().enumerate().take(a + 1) {
-                    matrix[(a, b)] += self.weight * left * right;
-                }
-            }
+    fn scene(&self) -> Scene {
+        let gain = |bin: usize| self.gains.factor(bin);
+        let along = |from: usize, bin: usize| {
+            (gain(bin) * harmonic::<SHADE>(&self.unknowns, from, direction(bin)).exp()) as f32
+        };
+        Scene {
+            radius: std::array::from_fn(|bin| {
+                harmonic::<BORDER>(&self.unknowns, RADIUS, direction(bin)) as f32
+            }),
+            wall: std::array::from_fn(|bin| along(SHADES, bin)),
+            tissue: std::array::from_fn(|bin| along(TISSUES, bin)),
+            lumen: std::array::from_fn(|bin| (gain(bin) * self.unknowns[BLOOD].exp()) as f32),
+            thickness: self.unknowns[THICKNESS].exp() as f32,
         }
+    }
+
+    fn normal_equations(&mut self) -> (Matrix, Vector, GainStep) {
+        let scene = self.scene();
+        self.fields.predict(&self.lattice, &self.steps, &scene);
+        self.weights.floor = 0.03 * self.unknowns[SHADES].exp() as f32;
+        let (mut matrix, mut gradient, gains) =
+            equations(&self.lattice, &self.fields, &self.weights, &self.gains, Residual::Echo);
         for k in 0..UNKNOWNS {
             let information = self.prior_sd[k].powi(-2);
             matrix[(k, k)] += information;
             gradient[k] += information * (self.prior[k] - self.unknowns[k]);
         }
-        matrix.fill_upper_triangle_with_lower_triangle();
-        (matrix, gradient)
+        (matrix, gradient, gains)
     }
 
-    fn border(&self, covariance: &DMatrix<f64>) -> Option<Border> {
-        let mut harmonics = [0.0; BORDER];
-        harmonics.copy_from_slice(self.unknowns.rows(0, BORDER).as_slice());
-        // The mean over the circumference of basis^T C basis.
-        let variance = covariance[(0, 0)] + (1..BORDER).map(|k| covariance[(k, k)] / 2.0).sum::<f64>();
-        let wall_db = 10.0 / std::f64::consts::LN_10 * (self.unknowns[BORDER] - self.unknowns[LUMEN]);
+    /// The right side that a residual makes, the gains held.
+    fn answer(&self, residual: Residual<'_>) -> Vector {
+        equations(&self.lattice, &self.fields, &self.weights, &Gains::NONE, residual).1
+    }
+
+    fn border(&mut self) -> Option<Border> {
+        let (matrix, ..) = self.normal_equations();
+        let inverse = matrix.cholesky()?.inverse();
+        let spread = self.spread_sd(&inverse);
+        let own = equations::noise(&self.lattice, &mut self.fields.clone(), &self.weights, self.input.sigma);
+        let (random, common) = self.covariances(&inverse, own);
+        self.unknowns += self.bias(&inverse, &random);
+        let wall_db = 10.0 / std::f64::consts::LN_10 * (self.unknowns[SHADES] - self.unknowns[BLOOD]);
         let border = Border {
             centre: self.input.region.centre,
-            harmonics,
-            unknowns: self.unknowns.clone(),
-            sd: variance.sqrt(),
-            covariance: covariance.fixed_view::<BORDER, BORDER>(0, 0).into_owned(),
-            common_sd: SPREAD_SD * (self.input.sigma.0 + self.input.sigma.1) / 2.0,
-            walled: self.walled(),
+            unknowns: self.unknowns,
+            gains: self.gains.clone(),
+            sd: random[(0, 0)].sqrt(),
+            covariance: random,
+            common_sd: mean_square(|k| common[(k, k)]).sqrt().hypot(spread),
+            walled: self.sight.walled,
             wall: self.unknowns[THICKNESS].exp(),
             contrast_db: wall_db,
         };
@@ -279,92 +275,112 @@ impl<'a> Model<'a> {
         (sound && positive).then_some(border)
     }
 
-    /// The part of the circumference where the image is at least 6 dB brighter in the wall than in the lumen.
-    fn walled(&self) -> f64 {
-        let thickness = self.unknowns[THICKNESS].exp();
-        let mut sums = [(0.0, 0.0); 12];
-        let mut lumen = (1e-12, 1e-9);
-        for (i, cell) in self.cells.iter().enumerate() {
-            let r: f64 = cell.border.iter().zip(self.unknowns.iter()).map(|(a, b)| a * b).sum();
-            let power = self.input.patch.power[i];
-            let sector =
-                (cell.border[2].atan2(cell.border[1]) / std::f64::consts::TAU).rem_euclid(1.0) * 12.0;
-            if let Some(sum) = sums.get_mut(sector as usize)
-                && (r..r + thickness).contains(&cell.r)
-            {
-                *sum = (sum.0 + power, sum.1 + 1.0);
-            }
-            if cell.r < 0.5 * r {
-                lumen = (lumen.0 + power, lumen.1 + 1.0);
-            }
+    /// Covariances of the border's harmonics: what is this image's own (its speckle, and shapes it cannot tell), and
+    /// what images of the same wall share (brightness and thickness as far as they are only expected).
+    fn covariances(&self, inverse: &Matrix, mut own: Matrix) -> (Harmonics, Harmonics) {
+        let mut shared = Matrix::zeros();
+        for k in 0..UNKNOWNS {
+            let of = if k < BORDER { &mut own } else { &mut shared };
+            of[(k, k)] += self.prior_sd[k].powi(-2);
         }
-        let dark = 4.0 * lumen.0 / lumen.1;
-        sums.iter().filter(|(power, n)| *n > 0.0 && power / n > dark).count() as f64 / 12.0
+        let border = |middle: Matrix| -> Harmonics {
+            (inverse * middle * inverse).fixed_view::<BORDER, BORDER>(0, 0).into_owned()
+        };
+        (border(own), border(shared))
+    }
+
+    /// What is to be added to the unknowns because the prediction bends: a border that speckle shakes predicts, on the
+    /// average, a softer edge than the picture has, and the fit answers with a thinner wall and a wider lumen (the bias
+    /// of second order of a quasi-score: Cox and Snell 1968).
+    fn bias(&self, inverse: &Matrix, covariance: &Harmonics) -> Vector {
+        let cell = self.lattice.cell;
+        let smeared = std::array::from_fn(|bin| {
+            let theta = direction(bin);
+            let basis = SVector::from(basis::<BORDER>(theta));
+            let half = 0.5 * basis.dot(&(covariance * basis));
+            let (sin, cos) = theta.sin_cos();
+            let (x, y) = (cos / cell.0, sin / cell.1);
+            [half * x * x, half * x * y, half * y * y].map(|value| value as f32)
+        });
+        inverse * self.answer(Residual::Smeared(&smeared))
+    }
+
+    /// How far the border moves, root mean square over the circumference, when the point spread is wider by its
+    /// standard deviation: that of the power solves the equation of heat.
+    fn spread_sd(&self, covariance: &Matrix) -> f64 {
+        let cells = |sigma: f64, cell: f64| (self.input.sigma_sd * (sigma / cell).powi(2) / 2.0) as f32;
+        let (x, y) =
+            (cells(self.input.sigma.0, self.lattice.cell.0), cells(self.input.sigma.1, self.lattice.cell.1));
+        let moved = |x: f32, y: f32| {
+            let by = covariance * self.answer(Residual::Wider { x, y });
+            mean_square(|k| by[k].powi(2))
+        };
+        (moved(x, 0.0) + moved(0.0, y)).sqrt()
     }
 }
 
-impl Cell {
-    fn new(input: &FitInput<'_>, cell: usize) -> Self {
-        let (x, y) = input.patch.place(cell);
-        let (dx, dy) = (x - input.region.centre.0, y - input.region.centre.1);
-        let (r, theta) = (dx.hypot(dy), dy.atan2(dx));
-        let (sin, cos) = theta.sin_cos();
-        let half = 0.5 * (input.patch.cell.0 * cos.abs() + input.patch.cell.1 * sin.abs());
-        let outwards = start_radius(input, theta) + input.wall + 1.2e-3;
-        Self { r, depth: dy, border: basis(theta), shade: basis(theta), half, used: r < outwards }
-    }
+/// The mean over the circumference of the square of harmonics, of each of which the square is known.
+fn mean_square(square: impl Fn(usize) -> f64) -> f64 {
+    square(0) + (1..BORDER).map(|k| square(k) / 2.0).sum::<f64>()
 }
 
-/// Where the wall is looked for first: the front's border, moved out by `1.75 sigma` (FIELD.md section 8).
+/// The cells round the lumen, far enough for the point spread to reach in.
+fn lattice(input: &FitInput<'_>, start: &[f64; BINS], sigma: (f64, f64)) -> Result<Lattice, NoLumen> {
+    let far = start.iter().copied().fold(0.0, f64::max) + input.wall + BEYOND_M;
+    let wanted = Wanted {
+        centre: input.region.centre,
+        half: (far + 3.5 * sigma.0, far + 3.5 * sigma.1),
+        cell: (CELL.0 * sigma.0, CELL.1 * sigma.1),
+    };
+    let outside = NoLumen::OutsidePicture { x_mm: wanted.centre.0 * 1e3, y_mm: wanted.centre.1 * 1e3 };
+    Lattice::new(input.bscan, input.table, &wanted).ok_or(outside)
+}
+
+/// Where the wall is looked for first: where an earlier fit had it, or the front's border moved out.
 fn start_radius(input: &FitInput<'_>, theta: f64) -> f64 {
+    if let Some(border) = input.earlier {
+        return border.radius(theta);
+    }
     let at = theta.rem_euclid(std::f64::consts::TAU) / std::f64::consts::TAU * RAYS as f64;
     let ray = at.round() as usize % RAYS;
+    input.region.radii[ray] + front_to_wall(input, theta)
+}
+
+/// How far inside the wall a front stands: `1.75 sigma` (FIELD.md section 8).
+fn front_to_wall(input: &FitInput<'_>, theta: f64) -> f64 {
     let (sin, cos) = theta.sin_cos();
-    input.region.radii[ray] + 1.75 * (input.sigma.0 * cos).hypot(input.sigma.1 * sin)
+    1.75 * (input.sigma.0 * cos).hypot(input.sigma.1 * sin)
 }
 
 /// Where the unknowns start, which is also what they are likely to be, and how sure that is.
-fn prior(input: &FitInput<'_>, cells: &[Cell]) -> (DVector<f64>, DVector<f64>) {
-    let mut prior = DVector::zeros(UNKNOWNS);
-    let mut sd = DVector::from_element(UNKNOWNS, 3.0);
-    for ray in 0..RAYS {
-        let r = start_radius(input, angle(ray));
-        for (k, b) in basis::<3>(angle(ray)).iter().enumerate() {
-            prior[k] += r * b * if k == 0 { 1.0 } else { 2.0 } / RAYS as f64;
-        }
-    }
+fn prior(input: &FitInput<'_>, lattice: &Lattice, start: &[f64; BINS], sight: &Sight) -> (Vector, Vector) {
+    let mut prior = Vector::zeros();
+    let mut sd = Vector::from_element(3.0);
+    prior.rows_mut(RADIUS, 3).copy_from(&circle(start, &sight.trust));
     // Size and place are free; sections of arteries are round or oval, and hardly anything else.
-    sd.rows_mut(0, 3).fill(10e-3);
+    sd.rows_mut(RADIUS, 3).fill(10e-3);
     for k in 2..=HARMONICS {
-        sd.rows_mut(2 * k - 1, 2).fill(1.2e-3 / (k * k) as f64);
+        sd.rows_mut(RADIUS + 2 * k - 1, 2).fill(1.6e-3 / (k * k) as f64);
     }
-    let mean = |from: f64, to: f64| {
-        let inside = cells.iter().zip(&input.patch.power).filter(|(cell, _)| {
-            let start = prior[0] + prior[1] * cell.border[1] + prior[2] * cell.border[2];
-            (start + from..start + to).contains(&cell.r)
-        });
-        let (sum, n) = inside.fold((1e-12, 1e-9), |(sum, n), (_, power)| (sum + power, n + 1.0));
-        f64::ln(sum / n)
-    };
-    let (wall, tissue) = (mean(0.0, input.wall), mean(input.wall + 0.5e-3, input.wall + 1.5e-3));
-    let lumen = mean(-1.0, -0.6 * prior[0]);
-    prior[BORDER] = wall;
-    sd.rows_mut(BORDER + 1, SHADE - 1).fill(0.5);
-    prior[TISSUE] = tissue;
-    sd[SLOPE] = 0.5;
-    prior[LUMEN] = lumen;
+    let mean = |from: f64, to: f64| lattice.mean(|bin| (start[bin] + from, start[bin] + to)).ln();
+    prior[SHADES] = mean(0.0, input.wall);
+    sd.rows_mut(SHADES + 1, SHADE - 1).fill(0.5);
+    prior[TISSUES] = mean(input.wall + 0.5e-3, input.wall + 1.5e-3);
+    sd.rows_mut(TISSUES + 1, SHADE - 1).fill(0.5);
+    prior[BLOOD] = lattice.mean(|bin| (-1.0, 0.4 * start[bin])).ln();
     prior[THICKNESS] = input.wall.ln();
-    sd[THICKNESS] = 0.25;
+    sd[THICKNESS] = 0.5;
     (prior, sd)
 }
 
-/// A step from 0 to 1 over a cell, and its derivative by the distance.
-fn ramp(distance: f64, half: f64) -> (f64, f64) {
-    if distance <= -half {
-        (0.0, 0.0)
-    } else if distance >= half {
-        (1.0, 0.0)
-    } else {
-        (0.5 + distance / (2.0 * half), 1.0 / (2.0 * half))
+/// The circle through the starts (mean radius and shift) that are trusted.
+fn circle(start: &[f64; BINS], trust: &[f32; BINS]) -> SVector<f64, 3> {
+    let mut matrix = SMatrix::<f64, 3, 3>::identity() * 1e-3;
+    let mut right = SVector::<f64, 3>::zeros();
+    for (bin, (r, trust)) in start.iter().zip(trust).enumerate() {
+        let basis = SVector::from(basis::<3>(direction(bin)));
+        matrix += basis * basis.transpose() * f64::from(*trust);
+        right += basis * (r * f64::from(*trust));
     }
+    matrix.cholesky().map_or(right, |solved| solved.solve(&right))
 }

@@ -59,6 +59,12 @@ pub enum NoLumen {
         /// How far (mm).
         by_mm: f64,
     },
+    /// The image says too little about where the border runs.
+    #[error("the border could be {sd_mm:.2} mm off where it is least sure: a shadow, or too little contrast")]
+    Unsure {
+        /// Standard deviation of the least sure point (mm).
+        sd_mm: f64,
+    },
     /// A contour that something else found is none.
     #[error("the contour {what}")]
     BadContour {
@@ -85,6 +91,7 @@ impl NoLumen {
             Self::NoWall { .. } => "no wall",
             Self::Radius { .. } => "radius out of range",
             Self::Jump { .. } => "away from its neighbours",
+            Self::Unsure { .. } => "border unsure",
             Self::BadContour { .. } => "no closed contour",
             Self::Declined => "none found",
             Self::Unsettled => "fit did not settle",

@@ -4,9 +4,11 @@
 //! Its border lies inside the wall (the wall's lateral skirt fills the lumen after log compression, FIELD.md
 //! section 8): it says where the lumen is, and [`fit`](super::fit) says how large.
 
+use std::cell::Cell;
+
 use super::NoLumen;
 use crate::fast_marching::{MarchGrid, march};
-use crate::patch::Patch;
+use crate::patch::{Patch, decibel};
 
 /// Directions in which a border is described.
 pub(crate) const RAYS: usize = 72;
@@ -14,6 +16,9 @@ pub(crate) const RAYS: usize = 72;
 /// A seed that is not this much darker than its surroundings is in no lumen (dB): half of what speckle's holes reach
 /// after smoothing.
 const LEAST_CONTRAST_DB: f64 = 6.0;
+/// A front is slow below this part of its full speed, and stands when it is so over about this many cells.
+const SLOW: f64 = 0.15;
+const STANDS_AFTER: f64 = 20.0;
 
 /// What the front filled.
 #[derive(Clone, Debug)]
@@ -35,11 +40,9 @@ struct Statistics {
 /// Grows the region round `seed` (m, in the image).
 pub(crate) fn grow(patch: &Patch, seed: (f64, f64)) -> Result<Region, NoLumen> {
     let outside = NoLumen::OutsidePicture { x_mm: seed.0 * 1e3, y_mm: seed.1 * 1e3 };
-    let db: Vec<f64> =
-        patch.smoothed((0.30e-3, 0.20e-3)).iter().map(|p| 10.0 * p.max(1e-9).log10()).collect();
-    // Wide enough that a speckle's hole is not taken for the lumen.
-    let wide = patch.smoothed((0.5e-3, 0.4e-3));
-    let start = darkest_near(patch, &wide, seed, 1.0e-3).ok_or(outside)?;
+    let smooth = patch.smoothed((0.30e-3, 0.20e-3));
+    let db: Vec<f32> = smooth.iter().map(|power| decibel(*power)).collect();
+    let start = darkest_near(patch, &smooth, seed, 1.0e-3).ok_or(outside)?;
     let (lumen, tissue) = (lumen_round(patch, &db, start), tissue(&db));
     let contrast_db = tissue.0 - lumen.0;
     if contrast_db < LEAST_CONTRAST_DB {
@@ -57,18 +60,36 @@ pub(crate) fn grow(patch: &Patch, seed: (f64, f64)) -> Result<Region, NoLumen> {
     found
 }
 
-fn grow_with(patch: &Patch, db: &[f64], start: usize, mut statistics: Statistics) -> Result<Region, NoLumen> {
+fn grow_with(patch: &Patch, db: &[f32], start: usize, mut statistics: Statistics) -> Result<Region, NoLumen> {
     statistics.sharpen();
     let first = fill(patch, db, start, &statistics);
     // Learned again from what was filled, unless that has run out of the lumen.
     if describe(patch, &first).is_ok() {
-        statistics.lumen = moments(first.iter().map(|&cell| db[cell]));
+        statistics.lumen = moments(first.iter().map(|&cell| f64::from(db[cell])));
         statistics.sharpen();
     }
     describe(patch, &fill(patch, db, start, &statistics))
 }
 
 impl Statistics {
+    /// The probability that a cell is lumen, divided by what the gradient there is worth.
+    fn speed(&self, grid: &MarchGrid, db: &[f32], cell: usize) -> f32 {
+        let (lumen, tissue) = (self.lumen, self.tissue);
+        // Darker than lumen is lumen, brighter than tissue is tissue.
+        let away = |from: (f64, f64), value: f64| -0.5 * ((value - from.0) / from.1).powi(2) - from.1.ln();
+        let value = f64::from(db[cell]).clamp(lumen.0, tissue.0.max(lumen.0));
+        let odds = away(tissue, value) - away(lumen, value);
+        let slope = |a: usize, b: usize, d: f64| f64::from(db[a] - db[b]) / (2.0 * d);
+        let (x, y) = (cell % grid.columns, cell / grid.columns);
+        let right = if x + 1 < grid.columns { cell + 1 } else { cell };
+        let below = if y + 1 < grid.rows { cell + grid.columns } else { cell };
+        let gx = slope(right, if x > 0 { cell - 1 } else { cell }, grid.dx);
+        let gy = slope(below, if y > 0 { cell - grid.columns } else { cell }, grid.dy);
+        // 20 dB a millimetre is an edge; speckle has half of it.
+        let edge = (gx * gx + gy * gy) / 4e8;
+        (1.0 / ((1.0 + odds.exp()) * (1.0 + edge)) + 1e-4) as f32
+    }
+
     /// Where the two overlap widely, the front would run through speckle: neither is wider than a third of what
     /// lies between them.
     fn sharpen(&mut self) {
@@ -78,29 +99,31 @@ impl Statistics {
     }
 }
 
-/// The darkest cell within `reach` of a place.
-fn darkest_near(patch: &Patch, power: &[f64], place: (f64, f64), reach: f64) -> Option<usize> {
+/// The cell within `reach` of a place round which it is darkest: wide enough that a speckle's hole is not taken for
+/// the lumen.
+fn darkest_near(patch: &Patch, power: &[f32], place: (f64, f64), reach: f64) -> Option<usize> {
     patch.cell_at(place)?;
-    within(patch, place, reach).min_by(|&a, &b| power[a].total_cmp(&power[b]))
-}
-
-fn within(patch: &Patch, place: (f64, f64), reach: f64) -> impl Iterator<Item = usize> {
-    (0..patch.power.len()).filter(move |&cell| {
-        let at = patch.place(cell);
-        (at.0 - place.0).hypot(at.1 - place.1) <= reach
-    })
+    let round = |cell: usize| {
+        let (sum, count) = patch
+            .within(patch.place(cell), 0.55e-3)
+            .fold((0.0, 0.0), |(sum, count), near| (sum + power[near], count + 1.0));
+        sum / count
+    };
+    let means = patch.within(place, reach).map(|cell| (cell, round(cell)));
+    means.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(cell, _)| cell)
 }
 
 /// What the lumen looks like, learned round the seed.
-fn lumen_round(patch: &Patch, db: &[f64], start: usize) -> (f64, f64) {
-    moments(within(patch, patch.place(start), 0.5e-3).map(|cell| db[cell]))
+fn lumen_round(patch: &Patch, db: &[f32], start: usize) -> (f64, f64) {
+    moments(patch.within(patch.place(start), 0.5e-3).map(|cell| f64::from(db[cell])))
 }
 
-/// What surrounds it looks like: the brighter half of the window.
-fn tissue(db: &[f64]) -> (f64, f64) {
-    let mut sorted = db.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    moments(sorted[sorted.len() / 2..].iter().copied())
+/// What surrounds it looks like: the brighter half of the window, of which every third cell is asked.
+fn tissue(db: &[f32]) -> (f64, f64) {
+    let mut some: Vec<f32> = db.iter().copied().step_by(3).collect();
+    let middle = some.len() / 2;
+    let (_, median, brighter) = some.select_nth_unstable_by(middle, f32::total_cmp);
+    moments(std::iter::once(&*median).chain(&*brighter).map(|db| f64::from(*db)))
 }
 
 /// Mean and standard deviation; the latter at least 2.5 dB, what averaged speckle leaves.
@@ -116,41 +139,25 @@ fn moments(values: impl Iterator<Item = f64>) -> (f64, f64) {
 }
 
 /// The cells the front reaches before it stands.
-fn fill(patch: &Patch, db: &[f64], start: usize, statistics: &Statistics) -> Vec<usize> {
+fn fill(patch: &Patch, db: &[f32], start: usize, statistics: &Statistics) -> Vec<usize> {
     let grid = MarchGrid { columns: patch.columns, rows: patch.rows, dx: patch.cell.0, dy: patch.cell.1 };
-    let speed = speed(&grid, db, statistics);
+    let speeds: Vec<Cell<f32>> = vec![Cell::new(f32::NAN); db.len()];
+    let speed = |cell: usize| {
+        let known = speeds[cell].get();
+        let found = if known.is_nan() { statistics.speed(&grid, db, cell) } else { known };
+        speeds[cell].set(found);
+        f64::from(found)
+    };
     // The front stands when what it takes in is slow on the average: it has met the wall nearly everywhere.
     let mut recent = 1.0;
     let mut cells = Vec::new();
-    march(&grid, &speed, &[start], |cell, _| {
-        recent += (speed[cell] - recent) / 30.0;
+    march(&grid, speed, &[start], |cell, _| {
+        recent += (speed(cell) - recent) / STANDS_AFTER;
         cells.push(cell);
-        recent > 0.15
+        recent > SLOW
     });
-    cells.retain(|&cell| speed[cell] > 0.15);
+    cells.retain(|&cell| speed(cell) > SLOW);
     cells
-}
-
-/// The probability that a cell is lumen, divided by what the gradient there is worth.
-fn speed(grid: &MarchGrid, db: &[f64], statistics: &Statistics) -> Vec<f64> {
-    let (lumen, tissue) = (statistics.lumen, statistics.tissue);
-    // Darker than lumen is lumen, brighter than tissue is tissue.
-    let away = |from: (f64, f64), value: f64| -0.5 * ((value - from.0) / from.1).powi(2) - from.1.ln();
-    let slope = |a: usize, b: usize, d: f64| (db[a] - db[b]) / (2.0 * d);
-    (0..db.len())
-        .map(|cell| {
-            let value = db[cell].clamp(lumen.0, tissue.0.max(lumen.0));
-            let odds = away(tissue, value) - away(lumen, value);
-            let (x, y) = (cell % grid.columns, cell / grid.columns);
-            let right = if x + 1 < grid.columns { cell + 1 } else { cell };
-            let below = if y + 1 < grid.rows { cell + grid.columns } else { cell };
-            let gx = slope(right, if x > 0 { cell - 1 } else { cell }, grid.dx);
-            let gy = slope(below, if y > 0 { cell - grid.columns } else { cell }, grid.dy);
-            // 20 dB a millimetre is an edge; speckle has half of it.
-            let edge = (gx.hypot(gy) / 20_000.0).powi(2);
-            1.0 / ((1.0 + odds.exp()) * (1.0 + edge)) + 1e-4
-        })
-        .collect()
 }
 
 /// Centre and border of the filled cells.

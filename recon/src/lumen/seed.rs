@@ -4,7 +4,7 @@ use probepath_us_capture::BScan;
 
 use super::NoLumen;
 use crate::LumenSettings;
-use crate::patch::{Patch, PowerOfGrey};
+use crate::patch::{Patch, PowerOfGrey, decibel};
 
 /// Directions in which a wall is looked for.
 const SECTORS: usize = 12;
@@ -24,8 +24,9 @@ pub(crate) fn find(
     let nothing = NoLumen::NothingRound { from_mm: from * 1e3, to_mm: to * 1e3 };
     let centre = (size.0 / 2.0, size.1 / 2.0);
     let patch = Patch::around(bscan, table, centre, centre, (0.5e-3, 0.5e-3)).ok_or(nothing)?;
-    let db: Vec<f64> = patch.smoothed((0.4e-3, 0.3e-3)).iter().map(|p| 10.0 * p.max(1e-9).log10()).collect();
+    let db: Vec<f32> = patch.smoothed((0.4e-3, 0.3e-3)).iter().map(|power| decibel(*power)).collect();
     let mut best = (LEAST_CONTRAST_DB, None);
+    let circles: Vec<Circle> = radii(settings.radius_range_m).map(Circle::new).collect();
     for cell in 0..db.len() {
         let at = patch.place(cell);
         let allowed = near.is_none_or(|(place, reach)| (at.0 - place.0).hypot(at.1 - place.1) <= reach);
@@ -34,8 +35,8 @@ pub(crate) fn find(
         }
         // A sonographer keeps the artery in the middle: a fifth of a decibel for every millimetre off it.
         let off = 200.0 * (at.0 - centre.0).abs();
-        for radius in radii(settings.radius_range_m) {
-            let score = contrast(&patch, &db, at, radius) - off;
+        for circle in &circles {
+            let score = circle.contrast(&patch, &db, at) - off;
             if score > best.0 {
                 best = (score, Some(at));
             }
@@ -48,24 +49,39 @@ fn radii(range: (f64, f64)) -> impl Iterator<Item = f64> {
     (0..9).map(|k| 1.2e-3 + 0.6e-3 * f64::from(k)).filter(move |r| (range.0..range.1).contains(r))
 }
 
-/// How much brighter the darker quarter of the surroundings is than the inside (dB).
-fn contrast(patch: &Patch, db: &[f64], at: (f64, f64), radius: f64) -> f64 {
-    let look = |r: f64, sector: usize| {
-        let (sin, cos) = (sector as f64 * std::f64::consts::TAU / SECTORS as f64).sin_cos();
-        patch.cell_at((at.0 + r * cos, at.1 + r * sin)).map(|cell| db[cell])
-    };
-    let (mut inside, mut n) = (0.0, 0.0);
-    let mut walls = [f64::NEG_INFINITY; SECTORS];
-    for (sector, wall) in walls.iter_mut().enumerate() {
-        for part in [0.25, 0.55] {
-            let Some(value) = look(part * radius, sector) else { return f64::NEG_INFINITY };
-            inside += value;
-            n += 1.0;
-        }
-        for out in [0.2e-3, 0.7e-3, 1.2e-3] {
-            *wall = wall.max(look(radius + out, sector).unwrap_or(f64::NEG_INFINITY));
+/// Where a circle is looked at, from its centre (m): inside it, and round it in every direction.
+struct Circle {
+    inside: Vec<(f64, f64)>,
+    round: [[(f64, f64); 3]; SECTORS],
+}
+
+impl Circle {
+    fn new(radius: f64) -> Self {
+        let ray = |sector: usize| (sector as f64 * std::f64::consts::TAU / SECTORS as f64).sin_cos();
+        let place = |sector: usize, r: f64| (r * ray(sector).1, r * ray(sector).0);
+        let inside = |part: f64| (0..SECTORS).map(move |sector| place(sector, part * radius));
+        Self {
+            inside: inside(0.25).chain(inside(0.55)).collect(),
+            round: std::array::from_fn(|sector| {
+                [0.2e-3, 0.7e-3, 1.2e-3].map(|out| place(sector, radius + out))
+            }),
         }
     }
-    walls.sort_by(f64::total_cmp);
-    walls[SECTORS / 4] - inside / n
+
+    /// How much brighter the darker quarter of the surroundings is than the inside (dB).
+    fn contrast(&self, patch: &Patch, db: &[f32], at: (f64, f64)) -> f64 {
+        let look =
+            |by: &(f64, f64)| patch.cell_at((at.0 + by.0, at.1 + by.1)).map(|cell| f64::from(db[cell]));
+        let mut inside = 0.0;
+        for by in &self.inside {
+            let Some(value) = look(by) else { return f64::NEG_INFINITY };
+            inside += value / self.inside.len() as f64;
+        }
+        let mut walls = [f64::NEG_INFINITY; SECTORS];
+        for (wall, round) in walls.iter_mut().zip(&self.round) {
+            *wall = round.iter().filter_map(look).fold(f64::NEG_INFINITY, f64::max);
+        }
+        walls.sort_by(f64::total_cmp);
+        walls[SECTORS / 4] - inside
+    }
 }

@@ -11,6 +11,8 @@ use crate::patch::{Patch, PowerOfGrey};
 
 /// Half the window the front may fill, over the largest radius.
 const WINDOW: f64 = 1.4;
+/// The cells that a front runs through (m).
+const CELL_M: f64 = 0.2e-3;
 /// The direction of the vessel is taken over this length (m).
 const MEMORY_M: f64 = 6e-3;
 /// A vessel not seen for longer than this is looked for anew (m).
@@ -78,7 +80,7 @@ pub(crate) fn grown(
 ) -> Result<Region, NoLumen> {
     let half = WINDOW * settings.radius_range_m.1;
     let outside = NoLumen::OutsidePicture { x_mm: place.0 * 1e3, y_mm: place.1 * 1e3 };
-    let patch = Patch::around(&image.bscan, table, place, (half, half), (0.16e-3, 0.16e-3)).ok_or(outside)?;
+    let patch = Patch::around(&image.bscan, table, place, (half, half), (CELL_M, CELL_M)).ok_or(outside)?;
     let region = grow(&patch, place)?;
     let by = (region.centre.0 - place.0).hypot(region.centre.1 - place.1);
     if by > 0.6 * settings.radius_range_m.1 { Err(NoLumen::Jump { by_mm: by * 1e3 }) } else { Ok(region) }
@@ -87,12 +89,17 @@ pub(crate) fn grown(
 /// Mean power of the brighter half of the picture (dB), from one pixel in 49.
 fn brighter_half_db(image: &PlacedBScan, table: &PowerOfGrey) -> f64 {
     let bscan = &image.bscan;
+    let mut counts = [0_u32; 256];
     let rows = bscan.pixels().chunks_exact(bscan.width()).step_by(7);
-    let mut greys: Vec<u8> = rows.flat_map(|row| row.iter().copied().step_by(7)).collect();
-    greys.sort_unstable();
-    let bright = &greys[greys.len() / 2..];
-    let power: f64 = bright.iter().map(|&grey| table.of(grey)).sum::<f64>() / bright.len().max(1) as f64;
-    10.0 * power.max(1e-9).log10()
+    rows.flat_map(|row| row.iter().step_by(7)).for_each(|&grey| counts[usize::from(grey)] += 1);
+    let half = counts.iter().sum::<u32>().div_ceil(2);
+    let (mut left, mut power) = (half, 0.0);
+    for (grey, count) in (0..=u8::MAX).zip(counts).rev() {
+        let taken = count.min(left);
+        power += f64::from(taken) * table.of(grey);
+        left -= taken;
+    }
+    10.0 * (power / f64::from(half.max(1))).max(1e-9).log10()
 }
 
 /// Where the vessel runs through the image's plane (m, in the image).
