@@ -150,6 +150,9 @@ impl Look<'_> {
         if border.contrast_db < 6.0 {
             return Err(NoLumen::NoContrast { contrast_db: border.contrast_db });
         }
+        if border.misfit > MOST_MISFIT {
+            return Err(NoLumen::Misfit { times: border.misfit });
+        }
         let sd_mm = contour.points_sd_mm.iter().copied().fold(0.0, f64::max);
         if sd_mm > MOST_UNSURE_MM + 0.1 * radius {
             return Err(NoLumen::Unsure { sd_mm });
@@ -160,6 +163,8 @@ impl Look<'_> {
 
 /// A border that is less sure than this (mm), and a tenth of the radius, somewhere is not given.
 const MOST_UNSURE_MM: f64 = 0.3;
+/// What a wall round a lumen cannot be by speckle: 0.7 to 0.95 are usual, wrong borders are above 1.2.
+const MOST_MISFIT: f64 = 1.15;
 
 fn contour(image: &PlacedBScan, border: &Border, region: &Region) -> Contour {
     let places = border.contour();
@@ -189,3 +194,6 @@ impl SeedPoint {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -42,6 +42,9 @@ const THICKNESS: usize = SPANS[BY_THICKNESS].0;
 
 /// How far outside the wall the image is asked (m).
 const BEYOND_M: f64 = 1.2e-3;
+/// How far outside of where a front lets expect it the wall is looked for (m), and the largest step of a fit.
+const FARTHEST_OUT_M: f64 = 1.0e-3;
+const LARGEST_STEP_M: f64 = 0.4e-3;
 /// Cells are this large, in standard deviations of the point spread's power along x and y.
 const CELL: (f64, f64) = (0.8, 1.2);
 /// Steps end when no harmonic moves farther (m), or after so many. Directions are tabulated, so that harmonics sway by
@@ -102,6 +105,9 @@ pub(crate) struct Border {
     pub(crate) common_sd: f64,
     /// Part of the circumference where a wall is seen (0 to 1).
     pub(crate) walled: f64,
+    /// Mean square of how far cells are off the prediction, in standard deviations: about one where a wall round a
+    /// lumen is what the picture shows.
+    pub(crate) misfit: f64,
     /// Wall's thickness (m).
     pub(crate) wall: f64,
     /// How much brighter than the lumen the wall is (dB).
@@ -184,19 +190,23 @@ pub(crate) fn fit(input: &FitInput<'_>) -> Result<Border, NoLumen> {
 /// A step no larger than the linearisation is good for.
 fn limited(step: Vector) -> Vector {
     let largest =
-        (step.rows(RADIUS, BORDER).amax() / 0.4e-3).max(step.rows(BORDER, UNKNOWNS - BORDER).amax());
+        (step.rows(RADIUS, BORDER).amax() / LARGEST_STEP_M).max(step.rows(BORDER, UNKNOWNS - BORDER).amax());
     if largest > 1.0 { step / largest } else { step }
 }
 
 impl<'a> Model<'a> {
     fn new(input: &'a FitInput<'a>) -> Result<Self, NoLumen> {
-        let start: [f64; BINS] = std::array::from_fn(|bin| start_radius(input, direction(bin)));
+        let mut start: [f64; BINS] = std::array::from_fn(|bin| start_radius(input, direction(bin)));
         let sigma = (input.sigma.0 / 2_f64.sqrt(), input.sigma.1 / 2_f64.sqrt());
         let mut lattice = lattice(input, &start, sigma)?;
-        lattice.limit(|bin| start[bin] + input.wall + BEYOND_M);
         let speckle = std::f64::consts::TAU * input.sigma.0 * input.sigma.1;
         let inside = std::array::from_fn(|bin| (start[bin] - front_to_wall(input, direction(bin))) as f32);
         let sight = Sight::new(&lattice, &inside);
+        if input.earlier.is_none() {
+            let off = sight.farther_out(|bin| front_to_wall(input, direction(bin)));
+            start.iter_mut().for_each(|r| *r += off.clamp(-LARGEST_STEP_M, FARTHEST_OUT_M));
+        }
+        lattice.limit(|bin| start[bin] + input.wall + BEYOND_M);
         let (prior, prior_sd) = prior(input, &lattice, &start, &sight);
         Ok(Self {
             steps: Steps::new(input.planes, lattice.cell),
@@ -253,6 +263,7 @@ impl<'a> Model<'a> {
 
     fn border(&mut self) -> Option<Border> {
         let (matrix, ..) = self.normal_equations();
+        let misfit = equations::misfit(&self.lattice, &self.fields, &self.weights);
         let inverse = matrix.cholesky()?.inverse();
         let spread = self.spread_sd(&inverse);
         let own = equations::noise(&self.lattice, &mut self.fields.clone(), &self.weights, self.input.sigma);
@@ -267,6 +278,7 @@ impl<'a> Model<'a> {
             covariance: random,
             common_sd: mean_square(|k| common[(k, k)]).sqrt().hypot(spread),
             walled: self.sight.walled,
+            misfit,
             wall: self.unknowns[THICKNESS].exp(),
             contrast_db: wall_db,
         };
@@ -326,7 +338,8 @@ fn mean_square(square: impl Fn(usize) -> f64) -> f64 {
 
 /// The cells round the lumen, far enough for the point spread to reach in.
 fn lattice(input: &FitInput<'_>, start: &[f64; BINS], sigma: (f64, f64)) -> Result<Lattice, NoLumen> {
-    let far = start.iter().copied().fold(0.0, f64::max) + input.wall + BEYOND_M;
+    let farther = if input.earlier.is_none() { FARTHEST_OUT_M } else { 0.0 };
+    let far = start.iter().copied().fold(0.0, f64::max) + farther + input.wall + BEYOND_M;
     let wanted = Wanted {
         centre: input.region.centre,
         half: (far + 3.5 * sigma.0, far + 3.5 * sigma.1),

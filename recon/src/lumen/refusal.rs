@@ -59,6 +59,14 @@ pub enum NoLumen {
         /// How far (mm).
         by_mm: f64,
     },
+    /// A wall round a lumen is not what the picture shows there.
+    #[error(
+        "the picture is {times:.1} times as far from a wall round a lumen as speckle makes it: a shadow or a fold"
+    )]
+    Misfit {
+        /// Mean square residual over the expected one.
+        times: f64,
+    },
     /// The image says too little about where the border runs.
     #[error("the border could be {sd_mm:.2} mm off where it is least sure: a shadow, or too little contrast")]
     Unsure {
@@ -91,6 +99,7 @@ impl NoLumen {
             Self::NoWall { .. } => "no wall",
             Self::Radius { .. } => "radius out of range",
             Self::Jump { .. } => "away from its neighbours",
+            Self::Misfit { .. } => "no wall round a lumen",
             Self::Unsure { .. } => "border unsure",
             Self::BadContour { .. } => "no closed contour",
             Self::Declined => "none found",

@@ -179,6 +179,23 @@ pub(super) fn noise(lattice: &Lattice, fields: &mut Fields, weights: &Weights, s
     expand(&sums, weights.speckles).0
 }
 
+/// Mean square of the residuals over what speckle lets expect, each cell counted as far as its direction is trusted.
+pub(super) fn misfit(lattice: &Lattice, fields: &Fields, weights: &Weights) -> f64 {
+    let (mut sum, mut expected) = (0.0_f32, 1e-9_f32);
+    for row in 0..lattice.rows {
+        let parts = fields.row(row);
+        for column in 0..lattice.columns {
+            let cell = row * lattice.columns + column;
+            let trust = lattice.used[cell] * weights.trust[usize::from(lattice.bin[cell])];
+            let predicted = parts[LUMEN][column] + parts[WALL][column] + parts[TISSUE][column];
+            let sd = predicted + weights.floor;
+            let off = ((lattice.power[cell] - predicted) / sd).min(BRIGHTEST);
+            (sum, expected) = (sum + trust * off * off, expected + trust * (predicted / sd).powi(2));
+        }
+    }
+    f64::from(sum / expected)
+}
+
 fn add_row(
     sums: &mut [Sum; SECTORS],
     lattice: &Lattice,

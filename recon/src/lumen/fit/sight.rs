@@ -15,12 +15,15 @@ pub(super) struct Sight {
     pub(super) trust: [f32; BINS],
     /// Part of the circumference where it is seen.
     pub(super) walled: f64,
+    /// How far outward of `inside` it rises to half its brightness (m), where it is seen.
+    rise: [Option<f32>; SECTORS],
 }
 
 impl Sight {
     /// Looks for a wall outward of `inside` (m, by direction), which lies within the lumen.
     pub(super) fn new(lattice: &Lattice, inside: &[f32; BINS]) -> Self {
-        let (peaks, lumen) = peaks(lattice, inside);
+        let (rings, lumen) = rings(lattice, inside);
+        let peaks: [f32; SECTORS] = std::array::from_fn(|sector| peak(&rings[sector]).1);
         let decibel: [f32; SECTORS] = std::array::from_fn(|sector| {
             let near = |by: usize| peaks[(sector + SECTORS + by - 1) % SECTORS];
             let mean = 0.25 * near(0) + 0.5 * near(1) + 0.25 * near(2);
@@ -29,13 +32,30 @@ impl Sight {
         // The brightest of a dozen rings is some 4 dB above the mean by speckle alone.
         let trust = |bin: usize| ((decibel[bin / BINS_A_SECTOR] - 7.0) / 5.0).clamp(0.02, 1.0);
         let seen = decibel.iter().filter(|&&db| db > 9.0).count();
-        Self { trust: std::array::from_fn(trust), walled: seen as f64 / SECTORS as f64 }
+        let rise = |sector: usize| (decibel[sector] > 9.0).then(|| rise(&rings[sector]));
+        Self {
+            trust: std::array::from_fn(trust),
+            walled: seen as f64 / SECTORS as f64,
+            rise: std::array::from_fn(rise),
+        }
+    }
+
+    /// By how much, in the median, the wall rises farther out than is expected (m outward of `inside`, by bin).
+    pub(super) fn farther_out(&self, expected: impl Fn(usize) -> f64) -> f64 {
+        let off = |(sector, rise): (usize, &Option<f32>)| {
+            Some(f64::from((*rise)?) - expected(sector * BINS_A_SECTOR + BINS_A_SECTOR / 2))
+        };
+        let mut off: Vec<f64> = self.rise.iter().enumerate().filter_map(off).collect();
+        off.sort_by(f64::total_cmp);
+        off.get(off.len() / 2).copied().unwrap_or(0.0)
     }
 }
 
-/// The brightest ring outward of the lumen in every sector, and the mean inside.
-fn peaks(lattice: &Lattice, inside: &[f32; BINS]) -> ([f32; SECTORS], f32) {
-    let mut rings = [[(0.0_f32, 0.0_f32); RINGS]; SECTORS];
+/// The mean of every ring outward of the lumen in every sector, and the mean inside.
+type Rings = [[f32; RINGS]; SECTORS];
+
+fn rings(lattice: &Lattice, inside: &[f32; BINS]) -> (Rings, f32) {
+    let mut sums = [[(0.0_f32, 0.0_f32); RINGS]; SECTORS];
     let (mut dark, mut count) = (1e-12, 1e-9);
     let cells = lattice.r.iter().zip(&lattice.bin).zip(lattice.power.iter().zip(&lattice.used));
     for ((r, bin), (power, used)) in cells {
@@ -50,12 +70,24 @@ fn peaks(lattice: &Lattice, inside: &[f32; BINS]) -> ([f32; SECTORS], f32) {
             }
             continue;
         }
-        if let Some(ring) = rings[bin / BINS_A_SECTOR].get_mut((out / RING_M) as usize) {
+        if let Some(ring) = sums[bin / BINS_A_SECTOR].get_mut((out / RING_M) as usize) {
             *ring = (ring.0 + power, ring.1 + 1.0);
         }
     }
-    let brightest = |rings: &[(f32, f32); RINGS]| {
-        rings.iter().filter(|ring| ring.1 > 0.0).map(|ring| ring.0 / ring.1).fold(0.0, f32::max)
-    };
-    (std::array::from_fn(|sector| brightest(&rings[sector])), dark / count)
+    let mean = |ring: (f32, f32)| if ring.1 > 0.0 { ring.0 / ring.1 } else { 0.0 };
+    (sums.map(|sector| sector.map(mean)), dark / count)
+}
+
+/// The brightest ring.
+fn peak(rings: &[f32; RINGS]) -> (usize, f32) {
+    rings.iter().copied().enumerate().fold((0, 0.0), |best, ring| if ring.1 > best.1 { ring } else { best })
+}
+
+/// Where the rings rise to half of the brightest, going outward (m).
+fn rise(rings: &[f32; RINGS]) -> f32 {
+    let (at, top) = peak(rings);
+    let below = rings[..at].iter().rposition(|ring| *ring < 0.5 * top);
+    let Some(below) = below else { return 0.0 };
+    let (low, high) = (rings[below], rings[below + 1]);
+    RING_M * (below as f32 + 0.5 + (0.5 * top - low) / (high - low).max(1e-20))
 }

@@ -1,0 +1,133 @@
+//! Lumens on images that nothing here was tuned on: other seeds, other walls, other disturbances.
+
+use super::*;
+use crate::phantom_images::{Phantom, Shadow, Vein};
+
+fn straight(seed: u64) -> Phantom {
+    Phantom { stenoses: Vec::new(), pixels: (320, 240), seed, ..Phantom::default() }
+}
+
+fn sweep(phantom: &Phantom, count: u32, step_mm: f64) -> Vec<PlacedBScan> {
+    (0..count).map(|i| phantom.bscan(u64::from(i), f64::from(i) * step_mm)).collect()
+}
+
+/// The area in the image's plane (mm2).
+fn true_area(phantom: &Phantom, image: &PlacedBScan) -> f64 {
+    let r = phantom.radius_at(image.world_from_image.origin().vector().x * 1e3);
+    let oblique = (1.0 + phantom.slope.0.powi(2) + phantom.slope.1.powi(2)).sqrt();
+    std::f64::consts::PI * r * r * phantom.oval.0 * phantom.oval.1 * oblique
+}
+
+/// Relative errors of the area, image by image, where there is a lumen.
+fn area_errors(phantom: &Phantom, images: &[PlacedBScan], found: &[ImageLumen]) -> Vec<f64> {
+    let error = |(image, found): (&PlacedBScan, &ImageLumen)| {
+        Some(found.lumen.as_ref().ok()?.area_mm2 / true_area(phantom, image) - 1.0)
+    };
+    images.iter().zip(found).filter_map(error).collect()
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+#[test]
+fn no_third_of_the_area_is_lost_on_other_walls_contrasts_and_disturbances() {
+    let vein =
+        |off, seed| Phantom { vein: Some(Vein { off, radius: 4.2, wall: (0.4, 0.6) }), ..straight(seed) };
+    let cases = [
+        ("a thin wall", Phantom { wall: 0.5, ..straight(101) }),
+        ("a thick wall", Phantom { wall: 1.3, ..straight(102) }),
+        ("a wall as dim as the tissue", Phantom { echoes: (0.02, 0.55, 0.5), ..straight(103) }),
+        ("a grey lumen", Phantom { echoes: (0.07, 1.0, 0.4), ..straight(104) }),
+        ("a bright wall in dark tissue", Phantom { echoes: (0.03, 1.8, 0.2), ..straight(105) }),
+        ("a dim picture", Phantom { gain_db: -16.0, ..straight(106) }),
+        ("a bright picture", Phantom { gain_db: 8.0, ..straight(107) }),
+        (
+            "a narrow shadow",
+            Phantom {
+                shadow: Some(Shadow { across: (-2.5, -1.0), below: 15.0, loss_db: 20.0 }),
+                ..straight(108)
+            },
+        ),
+        ("reverberations", Phantom { bands: vec![(32.0, 0.4, 0.15), (33.6, 0.4, 0.1)], ..straight(109) }),
+        ("a vessel off the middle", Phantom { across: -10.0, ..straight(110) }),
+        ("an oblique vessel", Phantom { slope: (-0.25, 0.2), ..straight(111) }),
+        ("an oval vessel", Phantom { oval: (1.2, 0.8), ..straight(112) }),
+        ("a vein beside it", vein((-9.0, 0.5), 113)),
+        ("a vein below it", vein((1.0, 8.8), 114)),
+    ];
+    for (name, phantom) in &cases {
+        let images = sweep(phantom, 10, 0.7);
+        let settings = LumenSettings::default();
+        let errors = area_errors(phantom, &images, &segment(&images, &settings));
+        assert!(errors.len() >= 9, "{name}: {} of 10 found", errors.len());
+        assert!(mean(&errors).abs() < 0.06, "{name}: {:+.1} %", 100.0 * mean(&errors));
+        let worst = errors.iter().fold(0.0_f64, |worst, error| worst.max(error.abs()));
+        assert!(worst < 0.2, "{name}: {:+.1} %", 100.0 * worst);
+    }
+}
+
+#[test]
+fn what_a_shadow_hides_is_refused_with_a_reason_or_right() {
+    for (seed, across) in [(121, (-1.0, 12.0)), (122, (2.0, 12.0)), (123, (-12.0, 0.5)), (124, (-6.0, 6.0))] {
+        let shadow = Some(Shadow { across, below: 20.0, loss_db: 30.0 });
+        let phantom = Phantom { shadow, ..straight(seed) };
+        let images = sweep(&phantom, 12, 0.7);
+        let found = segment(&images, &LumenSettings::default());
+        let errors = area_errors(&phantom, &images, &found);
+        let wrong = errors.iter().filter(|error| error.abs() > 0.33).count();
+        assert!(wrong <= 1, "{across:?}: {errors:.2?}");
+        for refused in found.iter().filter_map(|found| found.lumen.as_ref().err()) {
+            assert!(!refused.to_string().is_empty() && !refused.kind().is_empty());
+        }
+    }
+}
+
+#[test]
+fn a_vessel_nearly_closed_is_right_or_refused_and_found_again_behind_it() {
+    let phantom = Phantom { stenoses: vec![(16.0, 16.0, 0.96)], ..straight(131) };
+    let images = sweep(&phantom, 33, 1.0);
+    let found = segment(&images, &LumenSettings::default());
+    for number in (0..6).chain(27..33) {
+        let contour = found[number].lumen.as_ref().expect("the lumen is wide there");
+        let error = contour.area_mm2 / true_area(&phantom, &images[number]) - 1.0;
+        assert!(error.abs() < 0.25, "image {number}: {:+.1} %", 100.0 * error);
+    }
+    let narrow = area_errors(&phantom, &images[13..20], &found[13..20]);
+    assert!(narrow.iter().all(|error| *error < 1.0), "{narrow:.2?}");
+}
+
+#[test]
+fn the_standard_deviation_of_a_point_is_what_it_is_off() {
+    let cases =
+        [straight(141), Phantom { echoes: (0.05, 0.8, 0.5), wall: 1.0, radius: 2.6, ..straight(142) }];
+    for phantom in &cases {
+        let images = sweep(phantom, 40, 0.8);
+        let (mut squares, mut count) = (0.0, 0.0);
+        for found in segment(&images, &LumenSettings::default()) {
+            let contour = found.lumen.expect("a lumen");
+            for (place, sd) in contour.world.iter().zip(&contour.points_sd_mm) {
+                let at = place.vector() * 1e3;
+                squares += (phantom.distance(at.x, at.y, at.z) / sd).powi(2);
+                count += 1.0;
+            }
+        }
+        let normalised = f64::sqrt(squares / count);
+        assert!((0.7..1.25).contains(&normalised), "{normalised:.2} standard deviations");
+    }
+}
+
+#[test]
+fn lateral_walls_are_less_sure_than_axial_ones_and_hidden_ones_less_than_seen_ones() {
+    let image = straight(151).bscan(0, 0.0);
+    let found = segment(std::slice::from_ref(&image), &LumenSettings::default());
+    let sure = found[0].lumen.as_ref().expect("a lumen");
+    // Ray 0 is lateral, a quarter of a turn on it is axial.
+    let quarter = sure.points_sd_mm.len() / 4;
+    assert!(sure.points_sd_mm[0] > 1.3 * sure.points_sd_mm[quarter], "{:?}", sure.points_sd_mm);
+    let shadow = Some(Shadow { across: (-1.5, 1.5), below: 36.0, loss_db: 30.0 });
+    let hidden = Phantom { shadow, ..straight(151) }.bscan(0, 0.0);
+    let found = segment(&[hidden], &LumenSettings::default());
+    let hidden = found[0].lumen.as_ref().expect("a lumen");
+    assert!(hidden.points_sd_mm[quarter] > 1.2 * sure.points_sd_mm[quarter], "{:?}", hidden.points_sd_mm);
+}
