@@ -2,6 +2,7 @@
 
 mod again;
 mod beam;
+mod branches;
 mod contour;
 mod finder;
 mod fit;
@@ -59,15 +60,17 @@ pub fn segment(images: &[PlacedBScan], settings: &LumenSettings) -> Vec<ImageLum
             .collect();
     }
     let each = images.iter().zip(regions.iter().zip(borders));
-    each.map(|(image, (region, border))| {
+    let lumens = each.map(|(image, (region, border))| {
         let lumen = match (region, border) {
             (Ok(region), Ok(border)) => look.accepted(image, &border, region),
             (Err(why), _) => Err(*why),
             (_, Err(why)) => Err(why),
         };
         ImageLumen { number: image.bscan.number, lumen, others: Vec::new() }
-    })
-    .collect()
+    });
+    let mut lumens: Vec<ImageLumen> = lumens.collect();
+    branches::in_sweep(images, &look, &mut lumens);
+    lumens
 }
 
 /// Images that are fitted one after the other, each from where the one before ended.
@@ -106,6 +109,9 @@ fn first_borders(
 /// How often the wall is fitted again with what the neighbouring images say about the beam's thickness.
 const PASSES: usize = 1;
 
+/// How well the point spread is known, as a part of itself.
+const SPREAD_SD: f64 = 0.1;
+
 /// What every fit needs.
 struct Look<'a> {
     table: &'a PowerOfGrey,
@@ -133,7 +139,7 @@ impl Look<'_> {
         let sigma = (spread.lateral_m(depth, setting) / FWHM, spread.axial_fwhm_m / FWHM);
         let wall = self.settings.wall_thickness_m;
         let (bscan, table) = (&image.bscan, self.table);
-        fit::fit(&FitInput { bscan, table, region, sigma, sigma_sd: 0.1, wall, planes, earlier })
+        fit::fit(&FitInput { bscan, table, region, sigma, sigma_sd: SPREAD_SD, wall, planes, earlier })
     }
 
     /// The contour of a border that is one of a lumen.

@@ -7,6 +7,7 @@ use probepath_frames::Point;
 use probepath_us_capture::PlacedBScan;
 
 use super::beam::{self, Section};
+use super::branches::Branches;
 use super::region::Region;
 use super::{Border, Contour, ImageLumen, Look, NoLumen, Plane, track};
 use crate::LumenSettings;
@@ -50,6 +51,7 @@ pub struct Tracker {
     table: PowerOfGrey,
     settings: LumenSettings,
     main: Followed,
+    branches: Branches,
     first: bool,
 }
 
@@ -57,7 +59,7 @@ impl Tracker {
     /// Before the first image.
     pub fn new(settings: LumenSettings) -> Self {
         let table = PowerOfGrey::new(settings.dynamic_range_db);
-        Self { table, settings, main: Followed::default(), first: true }
+        Self { table, settings, main: Followed::default(), branches: Branches::default(), first: true }
     }
 }
 
@@ -68,7 +70,8 @@ impl LumenFinder for Tracker {
         self.first = false;
         let region = track::region(image, &self.table, &self.settings, &self.main.trail, given);
         let lumen = region.and_then(|region| self.main.contour(image, &region, &look));
-        ImageLumen { number: image.bscan.number, lumen, others: Vec::new() }
+        let others = self.branches.find(image, lumen.as_ref().ok(), &look);
+        ImageLumen { number: image.bscan.number, lumen, others }
     }
 }
 

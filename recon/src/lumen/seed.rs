@@ -11,12 +11,12 @@ const SECTORS: usize = 12;
 /// A circle whose surroundings are not this much brighter than its inside is no vessel (dB).
 const LEAST_CONTRAST_DB: f64 = 9.0;
 
-/// The centre of the most vessel-like circle (m, in the image), within `near` of a place when one is given.
+/// The centre of the most vessel-like circle (m, in the image), of the places that are allowed.
 pub(crate) fn find(
     bscan: &BScan,
     table: &PowerOfGrey,
     settings: &LumenSettings,
-    near: Option<((f64, f64), f64)>,
+    allowed: impl Fn((f64, f64)) -> bool,
 ) -> Result<(f64, f64), NoLumen> {
     let setting = &bscan.setting;
     let size = (bscan.width() as f64 * setting.spacing.x_m, bscan.height() as f64 * setting.spacing.y_m);
@@ -29,8 +29,7 @@ pub(crate) fn find(
     let circles: Vec<Circle> = radii(settings.radius_range_m).map(Circle::new).collect();
     for cell in 0..db.len() {
         let at = patch.place(cell);
-        let allowed = near.is_none_or(|(place, reach)| (at.0 - place.0).hypot(at.1 - place.1) <= reach);
-        if !allowed || !(from..to).contains(&(at.1 + setting.window_top_m)) {
+        if !allowed(at) || !(from..to).contains(&(at.1 + setting.window_top_m)) {
             continue;
         }
         // A sonographer keeps the artery in the middle: a fifth of a decibel for every millimetre off it.

@@ -1,7 +1,7 @@
 //! Lumens on images that nothing here was tuned on: other seeds, other walls, other disturbances.
 
 use super::*;
-use crate::phantom_images::{Phantom, Shadow, Vein};
+use crate::phantom_images::{Branch, Phantom, Shadow, Vein};
 
 fn straight(seed: u64) -> Phantom {
     Phantom { stenoses: Vec::new(), pixels: (320, 240), seed, ..Phantom::default() }
@@ -130,4 +130,35 @@ fn lateral_walls_are_less_sure_than_axial_ones_and_hidden_ones_less_than_seen_on
     let found = segment(&[hidden], &LumenSettings::default());
     let hidden = found[0].lumen.as_ref().expect("a lumen");
     assert!(hidden.points_sd_mm[quarter] > 1.2 * sure.points_sd_mm[quarter], "{:?}", hidden.points_sd_mm);
+}
+
+#[test]
+fn a_branch_is_followed_under_its_own_number_and_a_vein_is_no_branch() {
+    let branch = Branch { at: 6.0, slope: (0.55, 0.15), radius: 2.6 };
+    let phantom = Phantom { branch: Some(branch), radius: 3.4, across: -3.0, ..straight(161) };
+    let images = sweep(&phantom, 30, 0.8);
+    let settings = LumenSettings::default();
+    let mut tracker = Tracker::new(settings.clone());
+    let live: Vec<ImageLumen> = images.iter().map(|image| tracker.find(image)).collect();
+    for found in [segment(&images, &settings), live] {
+        let seen = found[20..].iter().filter(|found| found.others.len() == 1).count();
+        assert!(seen >= 8, "{seen} of 10");
+        assert!(found[..5].iter().all(|found| found.others.is_empty()), "before it leaves");
+        for (image, found) in images.iter().zip(&found).skip(20) {
+            let Some(other) = found.others.first() else { continue };
+            assert_eq!(other.vessel, found.others[0].vessel);
+            let x = image.world_from_image.origin().vector().x * 1e3;
+            let truth = (
+                phantom.across + branch.slope.0 * (x - branch.at),
+                phantom.depth + branch.slope.1 * (x - branch.at),
+            );
+            let at = other.centre.vector() * 1e3;
+            assert!((at.y - truth.0).hypot(at.z - truth.1) < 0.6, "{at:?} {truth:?}");
+        }
+    }
+    let vein = Vein { off: (8.6, 0.0), radius: 4.0, wall: (0.4, 0.6) };
+    let stenoses = vec![(14.0, 14.0, 0.6)];
+    let beside = Phantom { vein: Some(vein), stenoses, ..straight(162) };
+    let found = segment(&sweep(&beside, 24, 1.0), &settings);
+    assert!(found.iter().all(|found| found.others.is_empty()));
 }

@@ -55,7 +55,12 @@ pub(crate) fn region(
     if let Some(place) = given {
         return grown(image, table, settings, place);
     }
-    let look = |near| seed::find(&image.bscan, table, settings, near);
+    let look = |near: Option<((f64, f64), f64)>| {
+        let allowed = |at: (f64, f64)| {
+            near.is_none_or(|(place, reach)| (at.0 - place.0).hypot(at.1 - place.1) <= reach)
+        };
+        seed::find(&image.bscan, table, settings, allowed)
+    };
     let Some(place) = predicted(image, trail) else {
         return grown(image, table, settings, look(None)?);
     };

@@ -184,8 +184,8 @@ pub(super) fn misfit(lattice: &Lattice, fields: &Fields, weights: &Weights) -> f
     let (mut sum, mut expected) = (0.0_f32, 1e-9_f32);
     for row in 0..lattice.rows {
         let parts = fields.row(row);
-        for column in 0..lattice.columns {
-            let cell = row * lattice.columns + column;
+        let cells = row * lattice.columns..(row + 1) * lattice.columns;
+        for (column, cell) in cells.enumerate() {
             let trust = lattice.used[cell] * weights.trust[usize::from(lattice.bin[cell])];
             let predicted = parts[LUMEN][column] + parts[WALL][column] + parts[TISSUE][column];
             let sd = predicted + weights.floor;

@@ -1,0 +1,188 @@
+//! Further arterial lumens: what the lumen that is followed opened into.
+//!
+//! A vein lies beside an artery along all its way; a branch was inside it a little earlier. So a second dark round
+//! thing with a wall is a branch when its middle lies where the lumen lay in an image shortly before. From there on it
+//! is followed as a vessel of its own, with its own number.
+
+use std::collections::VecDeque;
+
+use probepath_frames::{Image, Pose, World};
+use probepath_us_capture::PlacedBScan;
+
+use super::finder::Followed;
+use super::{Contour, ImageLumen, Look, seed, track};
+
+/// How far back a branch may have been inside the lumen (m).
+const BACK_M: f64 = 8e-3;
+/// The lumen was at least so much larger there.
+const LARGER: f64 = 1.15;
+/// A branch that fewer images of a sweep show than this is none.
+const LEAST_IMAGES: usize = 4;
+/// Centres nearer than this are of one lumen (m).
+const SAME_M: f64 = 1.5e-3;
+
+/// Where the lumen lay in an image.
+#[derive(Clone, Debug)]
+struct Outline {
+    image_from_world: Pose<Image, World>,
+    points: Vec<(f64, f64)>,
+    area_mm2: f64,
+}
+
+impl Outline {
+    fn of(image: &PlacedBScan, contour: &Contour) -> Self {
+        let spacing = image.bscan.setting.spacing;
+        let points = contour.pixels.iter().map(|p| (p.0 * spacing.x_m, p.1 * spacing.y_m)).collect();
+        let image_from_world = image.world_from_image.inverse();
+        Self { image_from_world, points, area_mm2: contour.area_mm2 }
+    }
+
+    /// Whether a place of another image, seen along this one's normal, is inside; and how far along that is (m).
+    fn holds(&self, image: &PlacedBScan, place: (f64, f64)) -> Option<f64> {
+        let world = image.world_from_image * probepath_frames::Point::new(place.0, place.1, 0.0);
+        let here = (self.image_from_world * world).vector();
+        inside(&self.points, (here.x, here.y)).then_some(here.z.abs())
+    }
+}
+
+/// Whether a place is inside a closed line (it is crossed an odd number of times on the way out).
+fn inside(line: &[(f64, f64)], place: (f64, f64)) -> bool {
+    let sides = line.iter().zip(line.iter().cycle().skip(1));
+    let crossings = sides.filter(|(a, b)| {
+        (a.1 > place.1) != (b.1 > place.1) && place.0 < a.0 + (place.1 - a.1) / (b.1 - a.1) * (b.0 - a.0)
+    });
+    crossings.count() % 2 == 1
+}
+
+/// The branches that are followed, image by image.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Branches {
+    outlines: VecDeque<Outline>,
+    followed: Vec<(usize, Followed)>,
+    known: usize,
+}
+
+impl Branches {
+    /// The branches in an image, by their numbers, beside the lumen that is followed there.
+    pub(super) fn find(
+        &mut self,
+        image: &PlacedBScan,
+        main: Option<&Contour>,
+        look: &Look<'_>,
+    ) -> Vec<Contour> {
+        let mut found = Vec::new();
+        self.followed.retain_mut(|(number, vessel)| {
+            let Some(place) = track::predicted(image, &vessel.trail) else { return false };
+            if track::far_from_trail(image, &vessel.trail, place) {
+                return false;
+            }
+            let contour = grown(image, look, vessel, place);
+            let contour = contour.filter(|own| main.into_iter().chain(&found).all(|other| apart(own, other)));
+            found.extend(contour.map(|contour| Contour { vessel: *number, ..contour }));
+            true
+        });
+        let Some(main) = main else { return found };
+        found.extend(self.born(image, main, &found, look));
+        self.outlines.push_front(Outline::of(image, main));
+        let centre = image.world_from_image.inverse() * main.centre;
+        let near = |outline: &Outline| {
+            let there = outline.image_from_world * (image.world_from_image * centre);
+            there.vector().z.abs() < BACK_M
+        };
+        self.outlines.retain(near);
+        self.outlines.truncate(MOST_OUTLINES);
+        found
+    }
+
+    /// A branch that has just left the lumen.
+    fn born(
+        &mut self,
+        image: &PlacedBScan,
+        main: &Contour,
+        known: &[Contour],
+        look: &Look<'_>,
+    ) -> Option<Contour> {
+        let opened = |outline: &&Outline| outline.area_mm2 > LARGER * main.area_mm2;
+        let wide: Vec<&Outline> = self.outlines.iter().filter(opened).collect();
+        if wide.is_empty() {
+            return None;
+        }
+        let own = Outline::of(image, main);
+        let allowed = |place: (f64, f64)| {
+            !inside(&own.points, place) && wide.iter().any(|outline| outline.holds(image, place).is_some())
+        };
+        let place = seed::find(&image.bscan, look.table, look.settings, allowed).ok()?;
+        let mut vessel = Followed::default();
+        let contour = grown(image, look, &mut vessel, place)?;
+        if !known.iter().chain([main]).all(|other| apart(&contour, other)) {
+            return None;
+        }
+        self.known += 1;
+        self.followed.push((self.known, vessel));
+        Some(Contour { vessel: self.known, ..contour })
+    }
+}
+
+/// An arm that stands still makes very many outlines of one place.
+const MOST_OUTLINES: usize = 200;
+
+fn grown(image: &PlacedBScan, look: &Look<'_>, vessel: &mut Followed, place: (f64, f64)) -> Option<Contour> {
+    let region = track::grown(image, look.table, look.settings, place).ok()?;
+    vessel.contour(image, &region, look).ok()
+}
+
+/// Whether two contours of one image are of two lumens.
+fn apart(a: &Contour, b: &Contour) -> bool {
+    a.centre.distance(&b.centre) * 1e3 > 0.8 * (a.radius_mm() + b.radius_mm())
+}
+
+/// The branches in every image of a sweep, looked for forward and backward: one that joins is one that leaves, seen
+/// from the other end.
+pub(super) fn in_sweep(images: &[PlacedBScan], look: &Look<'_>, found: &mut [ImageLumen]) {
+    let (mut forward, mut backward) = (Branches::default(), Branches::default());
+    for (image, lumen) in images.iter().zip(found.iter_mut()) {
+        lumen.others = forward.find(image, lumen.lumen.as_ref().ok(), look);
+    }
+    let mut again: Vec<(usize, Vec<Contour>)> = Vec::new();
+    for (index, (image, lumen)) in images.iter().zip(found.iter()).enumerate().rev() {
+        let others = backward.find(image, lumen.lumen.as_ref().ok(), look);
+        if !others.is_empty() {
+            again.push((index, others));
+        }
+    }
+    join(found, again, forward.known);
+    drop_the_rare(found);
+}
+
+/// Adds what the way back found: under the number it has on the way there, where both see it, or under a new one.
+fn join(found: &mut [ImageLumen], again: Vec<(usize, Vec<Contour>)>, known: usize) {
+    let mut numbers = std::collections::BTreeMap::new();
+    let same = |a: &Contour, b: &Contour| a.centre.distance(&b.centre) < SAME_M;
+    for (index, others) in &again {
+        for other in others {
+            let twin = found.get(*index).and_then(|lumen| lumen.others.iter().find(|own| same(own, other)));
+            if let Some(twin) = twin {
+                numbers.entry(other.vessel).or_insert(twin.vessel);
+            }
+        }
+    }
+    for (index, others) in again {
+        let Some(lumen) = found.get_mut(index) else { continue };
+        for other in others {
+            let vessel = numbers.get(&other.vessel).copied().unwrap_or(known + other.vessel);
+            if lumen.others.iter().all(|own| own.vessel != vessel && apart(own, &other)) {
+                lumen.others.push(Contour { vessel, ..other });
+            }
+        }
+        lumen.others.sort_by_key(|contour| contour.vessel);
+    }
+}
+
+fn drop_the_rare(found: &mut [ImageLumen]) {
+    let mut counts = std::collections::BTreeMap::<usize, usize>::new();
+    for contour in found.iter().flat_map(|lumen| &lumen.others) {
+        *counts.entry(contour.vessel).or_default() += 1;
+    }
+    let often = |contour: &Contour| counts.get(&contour.vessel).is_some_and(|count| *count >= LEAST_IMAGES);
+    found.iter_mut().for_each(|lumen| lumen.others.retain(often));
+}
