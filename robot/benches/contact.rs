@@ -7,19 +7,18 @@ use std::hint::black_box;
 use criterion::{Criterion, criterion_group, criterion_main};
 use probepath_frames::nalgebra::Vector3;
 use probepath_frames::{Span, Wrench};
-use probepath_robot::{ContactLaw, ContactSettings, ContactWatch, Face, TouchDown, TouchDownSettings};
+use probepath_robot::{ContactLaw, ContactSettings, ContactWatch, Face};
 
 const PERIOD: Span = Span::from_milliseconds(2);
 
 /// A law that holds 5 N on a spring, and a sensor's noise of a simple kind.
 fn contact(criterion: &mut Criterion) {
-    let law = ContactLaw::new(ContactSettings::default(), PERIOD).expect("the default settings can be");
-    let mut down = TouchDown::new(law, TouchDownSettings::default(), 5.0, PERIOD).expect("so can these");
+    let mut law = ContactLaw::new(ContactSettings::default(), PERIOD).expect("the default settings can be");
     let mut offset = 0.0;
     for _ in 0..5000 {
-        offset = down.step(1000.0 * f64::max(offset, 0.0));
+        offset = law.step(1000.0 * f64::max(offset, 0.0), 5.0);
     }
-    let (mut law, mut noise) = (*down.law(), 0.05);
+    let mut noise = 0.05;
     criterion.bench_function("contact law, a tick on the skin", |b| {
         b.iter(|| {
             noise = -noise;

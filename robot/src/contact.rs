@@ -1,4 +1,4 @@
-//! [`ContactLaw`]: holds the force along the probe's z by moving the probe along it; [`TouchDown`]: finds the skin.
+//! [`ContactLaw`]: holds the force along the probe's z by moving the probe along it.
 //!
 //! Pressing force in, offset along the probe's z out (positive into the tissue), every output jerk-limited.
 //!
@@ -18,7 +18,6 @@ pub(crate) mod pressure;
 mod settings;
 mod stiffness;
 mod tank;
-mod touch_down;
 
 use probepath_frames::Span;
 
@@ -28,7 +27,6 @@ pub use settings::{ContactError, ContactSettings};
 pub use stiffness::SkinEstimate;
 use stiffness::Stiffness;
 use tank::Tank;
-pub use touch_down::{TouchDown, TouchDownPhase, TouchDownSettings};
 
 /// How the bandwidth falls with the stiffness that is reckoned with: softer skin makes less force of the same error in
 /// place, and more motion of the same noise.

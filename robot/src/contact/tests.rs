@@ -5,6 +5,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use super::*;
+use touch_down::{Phase, TouchDown};
+
+mod touch_down;
 
 const PERIOD: Span = Span::from_milliseconds(2);
 const DT: f64 = 0.002;
@@ -145,7 +148,7 @@ fn worst(seeds: u64, speed: f64, disturbance: Disturbance) -> (Held, f64) {
 
 fn hold(skin: &Skin, mut plant: Plant) -> Held {
     let law = ContactLaw::new(ContactSettings::default(), PERIOD).unwrap();
-    let mut down = TouchDown::new(law, TouchDownSettings::default(), WANTED, PERIOD).unwrap();
+    let mut down = TouchDown::new(law);
     let gap = 0.005;
     let (mut x, mut force, mut squares, mut count) = (0.0, 0.0, 0.0, 0.0);
     let mut held = Held { rms: 0.0, overshoot: 0.0, most: 0.0, largest_jerk: 0.0 };
@@ -157,7 +160,7 @@ fn hold(skin: &Skin, mut plant: Plant) -> Held {
         let lifted = skin.disturbance.at(x, f64::from(tick) * DT);
         let surface = gap + skin.height(x) - skin.height(0.0) - lifted;
         force = (skin.stiffness(x) * (plant.at - surface)).max(0.0);
-        if down.phase() == TouchDownPhase::Held {
+        if down.phase == Phase::Held {
             x += skin.speed * DT;
             held.most = held.most.max(force);
             squares += (force - WANTED).powi(2);
@@ -249,11 +252,11 @@ fn after_a_long_time_at_the_end_it_comes_back_at_once() {
 #[test]
 fn no_skin_is_said_and_not_searched_for_ever() {
     let law = ContactLaw::new(ContactSettings::default(), PERIOD).unwrap();
-    let mut down = TouchDown::new(law, TouchDownSettings::default(), WANTED, PERIOD).unwrap();
+    let mut down = TouchDown::new(law);
     for _ in 0..4000 {
         down.step(0.05);
     }
-    assert_eq!(down.phase(), TouchDownPhase::NoContact);
+    assert_eq!(down.phase, Phase::NoContact);
 }
 
 #[test]
@@ -271,7 +274,7 @@ fn little_jerk_makes_it_slower_and_never_lets_it_bounce() {
     for jerk_m_s3 in [8.0, 10.0, 20.0] {
         let settings = ContactSettings { jerk_m_s3, acceleration_m_s2: 0.5, ..ContactSettings::default() };
         let law = ContactLaw::new(settings, PERIOD).unwrap();
-        let mut down = TouchDown::new(law, TouchDownSettings::default(), WANTED, PERIOD).unwrap();
+        let mut down = TouchDown::new(law);
         let mut plant = Plant::new(ChaCha8Rng::seed_from_u64(1));
         let (mut force, mut touched) = (0.0, false);
         for _ in 0..2500 {
@@ -281,6 +284,6 @@ fn little_jerk_makes_it_slower_and_never_lets_it_bounce() {
             touched |= force > 0.8;
             assert!(!touched || (0.2..5.5).contains(&force), "{force} N with {jerk_m_s3} m/s³");
         }
-        assert_eq!(down.phase(), TouchDownPhase::Held);
+        assert_eq!(down.phase, Phase::Held);
     }
 }
