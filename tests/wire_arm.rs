@@ -119,6 +119,11 @@ fn a_protective_stop_is_seen_at_its_tick_and_recovered_on_a_word() {
     let (first, ticks) = (arm.exchange(&Command::Stay).unwrap(), running.counters().ticks);
     let (fault, last) = until_fault(&mut arm, 1000);
     assert!(matches!(fault, ArmFault::ProtectiveStop { .. }), "{fault}");
+    let told = fault.to_string();
+    assert!(
+        told.contains("the controller says: C0A0: PROTECTIVE_STOP"),
+        "its primary interface's words: {told}"
+    );
     assert_eq!(ticks + last.tick - first.tick, 299, "well until the tick before, and seen at its own");
     let scripts = running.counters().scripts;
     let recovered = arm.recover().unwrap();

@@ -141,8 +141,8 @@ const REMEMBERS_S: f64 = 120.0;
 const PORTS: [(u16, &str); 6] = [
     (Ports::RTDE, "RTDE: real-time data, 500 Hz"),
     (Ports::DASHBOARD, "dashboard: power, brakes, protective stops, popups"),
-    (Ports::PRIMARY, "primary: version, scripts"),
-    (Ports::SECONDARY, "secondary: version, scripts"),
+    (Ports::PRIMARY, "primary: version, messages, scripts"),
+    (Ports::SECONDARY, "secondary: version, messages, scripts"),
     (Ports::REALTIME, "scripts"),
     (IGTL_PORT, "OpenIGTLink: B-scans"),
 ];

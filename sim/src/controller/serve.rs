@@ -49,6 +49,8 @@ pub(super) struct World {
     /// How often each integer input was written.
     pulses: [u64; super::registers::COUNT],
     jitter: crate::random::Stream,
+    /// Whoever hears what is said on the primary and the secondary interface.
+    listeners: BTreeMap<u64, TcpStream>,
 }
 
 /// One RTDE connection.
@@ -67,6 +69,7 @@ impl Server {
             next_client: 0,
             pulses: [0; super::registers::COUNT],
             jitter: crate::random::Stream::new(1, "wire jitter"),
+            listeners: BTreeMap::new(),
         };
         Arc::new(Self {
             world: Mutex::new(world),

@@ -13,6 +13,7 @@ use super::link::Link;
 use super::measured::Measured;
 use super::registers::{command, state};
 use super::settings::TICK;
+use super::words::Words;
 use super::{UrError, UrSettings, clock, safety, signs};
 use crate::{Arm, ArmFault, Command, Joints, State};
 
@@ -50,6 +51,7 @@ pub struct UrArm {
     /// `None` once it is lost.
     link: Option<Link>,
     dashboard: Dashboard,
+    words: Words,
     report: Connected,
     counts: UrCounts,
     sequence: i32,
@@ -82,6 +84,7 @@ impl UrArm {
             settings,
             link: Some(link),
             dashboard,
+            words: Words::of(host),
             report,
             counts,
             sequence,
@@ -95,6 +98,17 @@ impl UrArm {
             same_echo: 0,
             fault: None,
         })
+    }
+
+    /// On a person's word, to an arm that stopped by itself while nobody was connected: unlocks a protective stop, then
+    /// connects.
+    ///
+    /// # Errors
+    /// As [`connect`](Self::connect), or when a person has to do something at the arm first.
+    pub fn connect_released(host: &str, settings: UrSettings) -> Result<Self, UrError> {
+        settings.check()?;
+        release(host)?;
+        Self::connect(host, settings)
     }
 
     /// What was found out while connecting.
@@ -137,6 +151,7 @@ impl UrArm {
         let Established { link, dashboard, last, sequence, session, report } =
             establish(&self.host, &self.settings)?;
         let now = clock::now();
+        self.words = Words::of(&self.host);
         (self.link, self.dashboard, self.report, self.last) = (Some(link), dashboard, report, last);
         (self.sequence, self.session) = (sequence, session);
         (self.sent, self.heard, self.emptied, self.same_echo) = ([now; KEPT], now, None, 0);

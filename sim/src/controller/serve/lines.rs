@@ -3,11 +3,15 @@
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::sync::Arc;
+use std::time::Duration;
 
 use super::Server;
 use crate::controller::core::Controller;
 use crate::controller::dashboard;
 use crate::controller::scripts::Scripts;
+
+/// Whoever listens reads within this.
+const READS_WITHIN: Duration = Duration::from_millis(20);
 
 /// The longest line of a client that is read.
 const LONGEST_LINE: usize = 4096;
@@ -44,8 +48,38 @@ pub(super) fn dashboard(server: &Arc<Server>, mut socket: TcpStream) {
 pub(super) fn primary(server: &Arc<Server>, mut socket: TcpStream) {
     let message = version_message(&server.world().controller);
     if socket.write_all(&message).is_ok() {
+        let number = listens(server, &socket);
         scripts(server, socket);
+        server.world().listeners.remove(&number);
     }
+}
+
+/// From now on this connection hears what is said; one that does not read is dropped.
+fn listens(server: &Arc<Server>, socket: &TcpStream) -> u64 {
+    let mut world = server.world();
+    world.next_client += 1;
+    let number = world.next_client;
+    if let Ok(listener) = socket.try_clone()
+        && listener.set_write_timeout(Some(READS_WITHIN)).is_ok()
+    {
+        world.listeners.insert(number, listener);
+    }
+    number
+}
+
+/// An error message of the primary interface, as the official client library reads it.
+pub(super) fn error_message(controller: &Controller, words: &str, level: i32) -> Vec<u8> {
+    let fields: [i32; 5] = [0, 0, level, 0, 0];
+    let fields: Vec<u8> = fields.iter().flat_map(|field| field.to_be_bytes()).collect();
+    robot_message(controller, 0xfe, 6, &[&fields[..], words.as_bytes()].concat())
+}
+
+/// A message of the primary interface.
+fn robot_message(controller: &Controller, source: u8, kind: u8, fields: &[u8]) -> Vec<u8> {
+    let microseconds = (controller.now().seconds() * 1e6) as u64;
+    let body = [&[20][..], &microseconds.to_be_bytes(), &[source, kind], fields].concat();
+    let size = u32::try_from(body.len() + 4).unwrap_or(0);
+    [&size.to_be_bytes()[..], &body[..]].concat()
 }
 
 /// A connection that takes scripts.
@@ -81,15 +115,11 @@ fn run(server: &Server, script: &[u8]) {
 /// The primary interface's version message, which the official library waits for.
 fn version_message(controller: &Controller) -> Vec<u8> {
     let version = controller.config.version;
-    let microseconds = (controller.now().seconds() * 1e6) as u64;
-    let mut body = vec![20];
-    body.extend(microseconds.to_be_bytes());
-    body.extend([0xff, 3, 9]);
+    let mut body = vec![9];
     body.extend(b"URControl");
     body.extend([u8::try_from(version.major).unwrap_or(0), u8::try_from(version.minor).unwrap_or(0)]);
     body.extend(version.bugfix.to_be_bytes());
     body.extend(version.build.to_be_bytes());
     body.extend(b"01-01-2024, 00:00:00");
-    let size = u32::try_from(body.len() + 4).unwrap_or(0);
-    [&size.to_be_bytes()[..], &body[..]].concat()
+    robot_message(controller, 0xff, 3, &body)
 }

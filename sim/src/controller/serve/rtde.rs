@@ -10,6 +10,7 @@ use std::net::{Shutdown, TcpStream};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use super::lines::error_message;
 use super::outbox::{Letter, Outbox};
 use super::pace::since;
 use super::{Client, Server, World, spawn};
@@ -142,7 +143,10 @@ impl World {
     }
 
     /// Tells every client something in words.
-    pub(super) fn tell(&self, message: &str, level: u8) {
+    pub(super) fn tell(&mut self, message: &str, level: u8) {
+        // What is an error there is a violation here.
+        let bytes = error_message(&self.controller, message, if level <= 1 { 3 } else { 1 });
+        self.listeners.retain(|_, listener| listener.write_all(&bytes).is_ok());
         for client in self.clients.values() {
             let bytes = client.session.text(message, level);
             client.outbox.put(Letter::answer(bytes, false));

@@ -13,6 +13,10 @@ use crate::ArmFault;
 /// When nobody asked for longer than this, what came meanwhile is read away first.
 const AWAY: Duration = Duration::from_millis(10);
 
+/// Words belong to a stop when they came so long before it, or after it.
+const SAID_BEFORE: Duration = Duration::from_millis(500);
+const SAID_AFTER: Duration = Duration::from_millis(100);
+
 /// Packages with one and the same echo until the script is taken to be hung. Its own watchdogs are quicker.
 const DEAF: u32 = 50;
 
@@ -20,12 +24,29 @@ impl UrArm {
     /// One tick, or the fault that lasts.
     pub(super) fn turn(&mut self, command: i32, setpoint: [f64; 6]) -> Result<(), ArmFault> {
         let turned = self.sent_and_received(command, setpoint).and_then(|()| self.judge());
-        if let Err(fault) = &turned {
-            self.fault = Some(fault.clone());
+        turned.map_err(|mut fault| {
             self.counts.faults += 1;
+            self.fault = Some(fault.clone());
             self.last_word();
+            self.explain(&mut fault);
+            self.fault = Some(fault.clone());
+            fault
+        })
+    }
+
+    /// The controller's own words for a stop that it made by itself. The arm is told to stay, and its words may be a
+    /// moment behind its data.
+    fn explain(&self, fault: &mut ArmFault) {
+        let (ArmFault::ProtectiveStop { why, .. }
+        | ArmFault::SafetyFault { why, .. }
+        | ArmFault::WatchdogStop { why, .. }) = fault
+        else {
+            return;
+        };
+        let words = self.words.lately(SAID_BEFORE, SAID_AFTER);
+        if !words.is_empty() {
+            *why = format!("{why}; the controller says: {words}");
         }
-        turned
     }
 
     fn sent_and_received(&mut self, command: i32, setpoint: [f64; 6]) -> Result<(), ArmFault> {
