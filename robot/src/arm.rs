@@ -209,4 +209,10 @@ pub trait Arm {
 pub trait Controller {
     /// The command for the next tick.
     fn step(&mut self, state: &State) -> Option<Command>;
+
+    /// After the operator's stop: the command for the next tick on the way to rest along its own path, for some ticks at
+    /// most. `None` where there is no path, or no way left to go: the limits brake every joint by itself then.
+    fn halt(&mut self, _state: &State) -> Option<Command> {
+        None
+    }
 }

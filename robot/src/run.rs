@@ -89,6 +89,9 @@ impl StopReason {
     }
 }
 
+/// How many ticks a controller gets to come to rest along its path after the operator's stop.
+const TICKS_TO_HALT: u64 = 40;
+
 /// How many ticks an arm gets to come to rest before a motion begins.
 const TICKS_TO_REST: u64 = 5000;
 
@@ -163,7 +166,7 @@ impl<'a> Motion<'a> {
                 return Ok(Ending::Observer(why));
             }
             if self.guard.is_stop_asked() {
-                return Ok(Ending::Operator);
+                return self.halt(controller);
             }
             let Some(wanted) = caught("controller", || controller.step(&self.state))? else {
                 return Ok(Ending::Done);
@@ -178,6 +181,18 @@ impl<'a> Motion<'a> {
                 }
             };
         }
+    }
+
+    /// The operator stops: a controller that knows its path comes to rest along it, what is left is braked.
+    fn halt(&mut self, controller: &mut dyn Controller) -> Left {
+        for _ in 0..TICKS_TO_HALT {
+            let halting = !self.free;
+            let next = if halting { caught("controller", || controller.halt(&self.state))? } else { None };
+            let Some(wanted) = next else { break };
+            let (command, changed) = self.limited(&wanted)?;
+            self.exchange(wanted, command, changed, false)?;
+        }
+        Ok(Ending::Operator)
     }
 
     /// One tick of giving way to the hand by the arm's own means; from rest only.

@@ -45,7 +45,8 @@ enum Stage {
 /// ```
 ///
 /// A pause slows the motion of any stage down to rest, in contact with the force held; a resume is slow at first.
-/// A stop is the loop's: it brakes; then [`LiftOff`](crate::LiftOff) takes the probe off the skin.
+/// A stop on the path slows down along it as a pause does, and the loop brakes what is left; then
+/// [`LiftOff`](crate::LiftOff) takes the probe off the skin.
 #[derive(Clone, Debug)]
 pub struct Replay {
     plan: Plan,
@@ -58,6 +59,8 @@ pub struct Replay {
     touch: Touch,
     on_path: OnPath,
     begun: bool,
+    /// Whether the operator's stop was heard: it comes to rest along the path.
+    halting: bool,
     board: Board,
     /// The most that the probe moves off the path (m/s): little after a pause, then e times as much each second.
     pace: f64,
@@ -80,8 +83,23 @@ impl Replay {
         let (on_path, dt) = (OnPath::new(&plan)?, plan.arm.period.seconds());
         let (stage, touch) = (Stage::Approach { leg: 0 }, Touch::new(settings.lost_after, dt));
         let board = Board::default();
-        let (begun, pace) = (false, f64::INFINITY);
-        Ok(Self { plan, settings, operator, stage, legs, clock, law, touch, on_path, begun, board, pace, dt })
+        let (begun, halting, pace) = (false, false, f64::INFINITY);
+        Ok(Self {
+            plan,
+            settings,
+            operator,
+            stage,
+            legs,
+            clock,
+            law,
+            touch,
+            on_path,
+            begun,
+            halting,
+            board,
+            pace,
+            dt,
+        })
     }
 
     /// The same, slow at first: at the speed of a resume, then e times faster every second. After a stop.
@@ -235,7 +253,7 @@ impl Replay {
     }
 
     fn tick(&mut self, state: &State) -> Option<Joints> {
-        let pause = self.operator.wish() != Asked::Go;
+        let pause = self.halting || self.operator.wish() != Asked::Go;
         // In reduced mode the arm's controller stops whoever is fast.
         let slow = pause || state.safety == Safety::Reduced;
         self.pace = if slow { self.settings.resume_speed } else { self.pace * (1.0 + self.dt) };
@@ -278,6 +296,16 @@ impl Controller for Replay {
         let joints = self.tick(state);
         self.report();
         joints.map(Command::Position)
+    }
+
+    /// On the skin it comes to rest along the path, the force held; in the air the limits are quicker.
+    fn halt(&mut self, state: &State) -> Option<Command> {
+        self.halting = true;
+        let moves = matches!(self.stage, Stage::Follow { .. }) && !self.clock.is_at_rest();
+        moves.then(|| self.tick(state)).flatten().map(|joints| {
+            self.report();
+            Command::Position(joints)
+        })
     }
 }
 

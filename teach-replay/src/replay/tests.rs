@@ -314,3 +314,33 @@ fn a_stop_in_every_phase_brakes_and_a_lift_off_then_takes_the_probe_off_the_skin
         }
     }
 }
+
+#[test]
+fn a_stop_on_the_path_comes_to_rest_along_it_in_less_than_a_tenth_of_a_second() {
+    let plan = short_fast_plan();
+    let (curve, length) = (path().trimmed(0.0, 0.03).unwrap().curve().clone(), plan.timing.length());
+    for part in [0.2, 0.4, 0.6] {
+        let stops_at = part * length;
+        let stop = |status: &ReplayStatus, _: usize, operator: &Operator| {
+            if status.phase == ReplayPhase::Follow && status.at_m >= stops_at {
+                operator.stop();
+            }
+        };
+        let outcome = replay_plan(plan.clone(), SOFT, 17, stop);
+        assert_eq!(outcome.finished.ending, Ending::Operator);
+        let stopped = outcome.seen.iter().position(|status| status.at_m >= stops_at).unwrap();
+        let after = &outcome.truth[stopped..];
+        let beside = |truth: &Truth| {
+            let probe = arm().probe(&truth.commanded).origin();
+            let local = |s: f64| (curve.at(s).base_from_probe.inverse() * probe).vector().xy().norm();
+            (0..1000).map(|i| local(stops_at + 5e-6 * f64::from(i) - 1e-3)).fold(f64::INFINITY, f64::min)
+        };
+        let moves =
+            |pair: &[Truth]| (pair[1].commanded.zip(&pair[0].commanded, |a, b| a - b)).largest() > 1e-9;
+        let ticks = after.windows(2).rposition(moves).map_or(0, |last| last + 1);
+        let off = after.iter().map(beside).fold(0.0, f64::max);
+        eprintln!("at rest {} ms after the word, at most {off:e} m beside the path", ticks * 2);
+        assert!(ticks <= 50, "{ticks} ticks");
+        assert!(off < 1e-5, "{off} m beside the path");
+    }
+}
