@@ -35,7 +35,8 @@ pub enum Command {
     /// Between the formats of sequences (.igs.mha, .igs.mhd, .igs.nrrd), of volumes (.mha, .nrrd), and of surfaces
     /// (.stl, .ply, .vtp); and from an exam (.mcap) to a DICOM multi-frame image (.dcm).
     Convert(Convert),
-    /// What the model of an arm says; forward and inverse kinematics. Or how punctual an arm on its wire is.
+    /// What the model of an arm says; forward and inverse kinematics. Or, of an arm on its wire: how punctual it is, what
+    /// it carries; and the way out of its own stop.
     Arm(Arm),
     /// Serves the simulated cell on the protocols of a real one, until Ctrl-C.
     Simulate(Simulate),
@@ -156,16 +157,25 @@ pub struct Convert {
 /// `arm`
 #[derive(Args, Debug)]
 pub struct Arm {
-    /// A URDF file, or the name of a model that comes along: `ur5e`, `seven_joint`. With --measure the arm's address:
-    /// `ur://host`.
+    /// A URDF file, or the name of a model that comes along: `ur5e`, `seven_joint`. With --measure, --identify-tool and
+    /// --recover the arm's address: `ur://host`.
     #[arg(required_unless_present = "cell")]
     pub urdf: Option<String>,
     /// Hold the arm still, and measure how punctual its ticks are.
-    #[arg(long, conflicts_with_all = ["base", "tip", "joints_deg", "flange_mm_deg"])]
+    #[arg(long, group = "mode", conflicts_with_all = ["base", "tip", "joints_deg", "flange_mm_deg"])]
     pub measure: bool,
+    /// Turn the probe where it hangs in the air, and say what the arm carries: mass, centre of gravity, the sensor's bias.
+    #[arg(long, group = "mode", conflicts_with_all = ["base", "tip", "joints_deg", "flange_mm_deg"])]
+    pub identify_tool: bool,
+    /// After the arm stopped by itself: ask, unlock it, and say where it is. Nothing moves.
+    #[arg(long, group = "mode", conflicts_with_all = ["base", "tip", "joints_deg", "flange_mm_deg"])]
+    pub recover: bool,
     /// The cell: where the arm is, and what it carries.
-    #[arg(long, value_name = "CELL.toml", requires = "measure")]
+    #[arg(long, value_name = "CELL.toml", requires = "mode")]
     pub cell: Option<PathBuf>,
+    /// Folder for the exam of --identify-tool.
+    #[arg(long, value_name = "DIR", default_value = "out", requires = "identify_tool")]
+    pub out: PathBuf,
     /// How long to measure.
     #[arg(long, value_name = "S", default_value_t = 10.0, requires = "measure")]
     pub seconds: f64,

@@ -5,7 +5,7 @@ mod simulate;
 
 use std::error::Error;
 
-use probepath_scripts::session::MeasureRequest;
+use probepath_scripts::session::{ArmRequest, MeasureRequest};
 use probepath_scripts::{Operator, ScanRequest, offline, validate};
 
 use crate::cli::{Command, FitOf, Goal, Unit};
@@ -30,7 +30,7 @@ pub fn perform(command: Command, screen: &Screen) -> Outcome {
             Document::of(&offline::convert(&args.input, &args.output, args.no_burned_in)?)
         }
         Command::Simulate(args) => return simulate::perform(args, screen),
-        Command::Arm(args) => return arm(args),
+        Command::Arm(args) => return arm(args, screen),
         Command::Validate(args) => return validated(&args, screen),
     };
     Ok(document?)
@@ -55,8 +55,19 @@ fn compared(args: crate::cli::Compare) -> offline::CompareWish {
     offline::CompareWish { surface, gold, fit, gold_unit_mm, out }
 }
 
-fn arm(args: crate::cli::Arm) -> Outcome {
-    let crate::cli::Arm { urdf, measure, cell, seconds, base, tip, joints_deg, flange_mm_deg } = args;
+fn arm(args: crate::cli::Arm, screen: &Screen) -> Outcome {
+    let crate::cli::Arm { urdf, measure, cell, seconds, base, tip, joints_deg, flange_mm_deg, .. } = args;
+    if args.identify_tool {
+        let request = ArmRequest { address: urdf, cell };
+        return Ok(Document::of(&request.identify_tool(
+            args.out,
+            &stopped_by_ctrl_c()?,
+            screen.progress(),
+        )?)?);
+    }
+    if args.recover {
+        return Ok(Document::of(&ArmRequest { address: urdf, cell }.recover(&*screen.progress())?)?);
+    }
     if measure {
         return Ok(Document::of(&MeasureRequest { address: urdf, cell, seconds }.run()?)?);
     }
@@ -76,11 +87,17 @@ fn reconstruct(args: crate::cli::Reconstruct, screen: &Screen) -> Outcome {
     Ok(Document::of(&offline::reconstruct(&wish, &*screen.progress())?)?)
 }
 
-fn scan(args: crate::cli::Scan, screen: &Screen) -> Outcome {
+/// Ctrl-C stops the arm.
+fn stopped_by_ctrl_c() -> Result<Operator, ctrlc::Error> {
     let operator = Operator::new();
     let stopping = operator.clone();
     // A second Ctrl-C does nothing more: the first one already brakes the arm, and the exam has to be closed.
     ctrlc::set_handler(move || stopping.stop())?;
+    Ok(operator)
+}
+
+fn scan(args: crate::cli::Scan, screen: &Screen) -> Outcome {
+    let operator = stopped_by_ctrl_c()?;
     let crate::cli::Scan { protocol, cell, seed, out } = args;
     let request = ScanRequest { protocol, cell, seed, out, date: Some(today()) };
     Ok(Document::of(&request.run(&operator, screen.progress())?)?)

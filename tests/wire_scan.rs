@@ -17,18 +17,21 @@
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use probepath_frames::nalgebra::Vector3;
-use probepath_robot::Operator;
 use probepath_robot::motion::follow::Curve;
+use probepath_robot::{Joints, Operator};
+use probepath_scripts::Progress;
 use probepath_scripts::protocol::Protocol;
 use probepath_scripts::session::{
-    CellFile, ControllerTime, GuideBy, MachineAddress, Opening, Scan, ScanWish, Session, TeachWish,
+    ArmRequest, CellFile, ControllerTime, GuideBy, MachineAddress, Opening, Scan, ScanWish, Session,
+    TeachWish,
 };
 use probepath_sim::controller::{ControllerConfig, ControllerServer, Running, Time};
 use probepath_sim::igtl::{self, MachineServer, MachineServerConfig};
 use probepath_sim::{CellConfig, SimulatedCell};
-use probepath_us_capture::exam::{Attachment, Exam};
+use probepath_us_capture::exam::{Attachment, Exam, TickRecord};
 
 const SEED: u64 = 5;
 
@@ -81,6 +84,28 @@ fn opening(cell: CellFile, out: &Path) -> Opening {
         date: None,
         operator: Operator::new(),
         progress: Arc::new(()),
+    }
+}
+
+/// Says yes, until told otherwise.
+struct Person {
+    says_yes: Arc<AtomicBool>,
+}
+
+impl Default for Person {
+    fn default() -> Self {
+        Self { says_yes: Arc::new(AtomicBool::new(true)) }
+    }
+}
+
+impl Progress for Person {
+    fn at(&self, _: &str, _: f64) {}
+
+    fn say(&self, _: &str) {}
+
+    fn confirm(&self, question: &str) -> bool {
+        assert!(question.ends_with('?'), "{question}");
+        self.says_yes.load(Ordering::SeqCst)
     }
 }
 
@@ -188,10 +213,33 @@ fn the_arm_gives_way_by_its_own_means_and_the_same_path_is_taught() {
 }
 
 #[test]
+fn what_lies_between_both_ways_of_giving_way_is_the_hands_unsteadiness() {
+    // The same hand without it: what is left is how each arm resists.
+    let steady = |unsteadiness: f64, by: GuideBy, name: &str| {
+        let out = folder(name);
+        let mut cell = arm_alone(simulated());
+        (cell.simulated.hand.unsteadiness, cell.simulated.hand.mishaps) = (unsteadiness, false);
+        let road = taught_and_scanned(cell, by, false, &out);
+        std::fs::remove_dir_all(out).unwrap();
+        road.taught
+    };
+    let off = |unsteadiness: f64| {
+        let here = steady(unsteadiness, GuideBy::Compliance, "steady-here");
+        let there = steady(unsteadiness, GuideBy::Freedrive, "steady-there");
+        furthest(there.get(10..there.len() - 10).unwrap(), &here)
+    };
+    let (steady, unsteady) = (off(0.0), off(1.0));
+    eprintln!("freedrive beside compliance: {steady} m with a steady hand, {unsteady} m with a usual one");
+    assert!(steady < 2e-3 && steady < unsteady, "{steady} {unsteady}");
+}
+
+#[test]
 fn after_a_protective_stop_nothing_moves_until_it_is_recovered_in_words() {
     let out = folder("stopped");
     let (running, file) = served(3);
-    let mut session = Session::open(opening(arm_alone(file), &out)).unwrap();
+    let person = Arc::new(Person::default());
+    let says_yes = Arc::clone(&person.says_yes);
+    let mut session = Session::open(Opening { progress: person, ..opening(arm_alone(file), &out) }).unwrap();
     let path = session.teach(&TeachWish { study: "WIRE-2".into(), ..TeachWish::default() }).unwrap();
     let path = session.trim(&path, 0.01, 0.03).unwrap();
     running.stop_protectively("somebody leans on the arm");
@@ -200,10 +248,88 @@ fn after_a_protective_stop_nothing_moves_until_it_is_recovered_in_words() {
     assert!(error.contains("stop"), "{error}");
     let again = session.scan(&path, &wish).unwrap_err().to_string();
     assert!(!again.is_empty());
+    says_yes.store(false, Ordering::SeqCst);
+    let refused = session.recover().unwrap_err().to_string();
+    assert!(refused.contains("nobody said yes"), "{refused}");
+    says_yes.store(true, Ordering::SeqCst);
     session.recover().unwrap();
     session.scan(&path, &wish).unwrap();
     session.close().unwrap();
     let exam = Exam::open(&session.exam_path()).unwrap();
     assert!(exam.events.iter().any(|event| event.text.contains("may move again")));
+    std::fs::remove_dir_all(out).unwrap();
+}
+
+/// The probe's speeds, commanded, from tick to tick (m/s).
+fn speeds(exam: &Exam, phase: &str) -> Vec<f64> {
+    let model = probepath_robot::Model::ur5e();
+    let place = |tick: &TickRecord| {
+        let joints = Joints::from_slice(tick.command.as_ref().unwrap_or(&tick.commanded).as_slice()).unwrap();
+        model.forward(&joints).origin()
+    };
+    let ticks: Vec<&TickRecord> = exam.ticks.iter().filter(|tick| tick.phase == phase).collect();
+    ticks.windows(2).map(|pair| place(pair[0]).distance(&place(pair[1])) / 0.002).collect()
+}
+
+#[test]
+fn right_after_a_recovery_a_path_is_taught_slowly_at_first() {
+    let out = folder("taught-after");
+    let (running, file) = served(4);
+    let person = Arc::new(Person::default());
+    let mut session = Session::open(Opening { progress: person, ..opening(arm_alone(file), &out) }).unwrap();
+    running.stop_protectively("somebody leans on the arm");
+    let wish = TeachWish { study: "WIRE-3".into(), ..TeachWish::default() };
+    assert!(session.teach(&wish).is_err());
+    session.recover().unwrap();
+    let path = session.teach(&wish).unwrap();
+    assert!(path.length() > 0.03, "{}", path.length());
+    session.close().unwrap();
+    let taught = speeds(&Exam::open(&session.exam_path()).unwrap(), "teach");
+    let first = taught.iter().position(|speed| *speed > 1e-5).unwrap();
+    let most = |speeds: &[f64]| speeds.iter().fold(0.0_f64, |most, speed| most.max(*speed));
+    let (at_first, later) = (most(&taught[..first + 250]), most(&taught));
+    eprintln!("taught at {at_first} m/s in the first half second of motion, at {later} m/s later");
+    assert!(later > at_first && at_first < 0.012 * (first as f64 * 0.002 + 0.5).exp());
+    std::fs::remove_dir_all(out).unwrap();
+}
+
+#[test]
+fn what_the_arm_carries_is_found_by_turning_the_probe_and_an_arm_that_stopped_is_unlocked_on_a_word() {
+    let out = folder("tool");
+    let (running, mut file) = served(5);
+    // Truly 0.85 kg at 6, 0, 70 mm.
+    (file.arm.payload_kg, file.arm.centre_of_gravity_mm) = (Some(0.65), Some([0.0, 10.0, 60.0]));
+    std::fs::create_dir_all(&out).unwrap();
+    std::fs::write(out.join("cell.toml"), file.text().unwrap()).unwrap();
+    let request = ArmRequest { address: None, cell: Some(out.join("cell.toml")) };
+    let person = Arc::new(Person::default());
+    let found = request.identify_tool(out.join("exam"), &Operator::new(), person.clone()).unwrap();
+    eprintln!("{found}");
+    let [x, y, z] = found.centre_of_gravity_mm.unwrap();
+    assert!((found.mass_kg - 0.85).abs() < 0.01, "{found}");
+    assert!((x - 6.0).abs() < 2.0 && y.abs() < 2.0 && (z - 70.0).abs() < 2.0, "{found}");
+    assert!(found.poses >= 6 && found.mass_error_kg < 0.01, "{found}");
+
+    running.stop_protectively("somebody leans on the arm");
+    let refused = request.recover(&()).unwrap_err().to_string();
+    assert!(refused.contains("nobody said yes"), "{refused}");
+    let recovered = request.recover(&*person).unwrap();
+    assert!(recovered.to_string().contains("unlocked") && recovered.joints.len() == 6, "{recovered}");
+    std::fs::remove_dir_all(out).unwrap();
+}
+
+#[test]
+fn a_sensor_that_drifts_is_told_of_after_the_scan_and_zeroed_in_the_air() {
+    let out = folder("drift");
+    let mut cell = arm_alone(simulated());
+    cell.simulated.sensor.drift_n_min = 2.0;
+    let mut session = Session::open(opening(cell, &out)).unwrap();
+    let path = session.teach(&TeachWish { study: "DRIFT".into(), ..TeachWish::default() }).unwrap();
+    let path = session.trim(&path, 0.01, 0.04).unwrap();
+    session.scan(&path, &ScanWish { look: false, ..ScanWish::default() }).unwrap();
+    session.close().unwrap();
+    let exam = Exam::open(&session.exam_path()).unwrap();
+    let told: Vec<&str> = exam.events.iter().map(|event| event.text.as_str()).collect();
+    assert!(told.iter().any(|text| text.contains("force sensor")), "{told:?}");
     std::fs::remove_dir_all(out).unwrap();
 }

@@ -4,6 +4,7 @@
 //! and every tick of it is recorded. Protocols, the command line and (later) the console speak to this and to nothing
 //! below it.
 
+mod arm_alone;
 mod bedside;
 mod calibrate;
 mod cell;
@@ -18,6 +19,7 @@ mod report;
 mod resume;
 mod scan;
 mod teach;
+mod tool;
 mod true_contact;
 mod truth;
 mod visit;
@@ -26,14 +28,15 @@ use std::path::{Path as FilePath, PathBuf};
 use std::sync::Arc;
 
 use probepath_frames::{Base, Pose, Stamp, World};
-use probepath_robot::{Guard, MotionLimits, Operator, State, Trip};
+use probepath_robot::{Guard, MotionLimits, Operator, State, Tool, Trip, ZeroWatch};
 use probepath_sim::{SimulatedCell, Truth};
 use probepath_us_capture::exam::{Attachment, Event, ExamHeader, ExamWriter, Level, Pace, Written};
 
+pub use arm_alone::{ArmRequest, Recovered};
 pub use calibrate::{CalibrateWish, Calibrated, Checked, StandardError};
 pub use cell::{
     ArmFile, BoxFile, CellFile, ControllerTime, ForceFile, IGTL_PORT, LimitsFile, MachineAddress,
-    MachineClock, MachineFile, PlaneFile, PoseFile, SettingFile, StoredCalibration, WorkspaceFile,
+    MachineClock, MachineFile, PhantomFile, PlaneFile, PoseFile, StoredCalibration, WorkspaceFile,
 };
 pub use error::SessionError;
 pub use locate::Located;
@@ -45,6 +48,7 @@ pub use report::{ReportWish, Segment};
 pub use scan::{Lumen, Scan, ScanWish};
 pub(crate) use scan::{SCAN_FIGURES, lumen_settings};
 pub use teach::{GuideBy, TeachWish};
+pub use tool::IdentifiedTool;
 pub use true_contact::TrueContact;
 pub use truth::{CalibrationTruth, SectionError, StenosisError};
 pub use visit::{CalibrationPlan, PhantomImages, VisitWish, Visits};
@@ -85,6 +89,8 @@ pub struct Opening {
 pub struct Session {
     cell: Cell,
     guard: Guard,
+    /// The force sensor's zero, and where something was felt last.
+    zero: ZeroWatch,
     opening: Opening,
     exam: Option<ExamWriter>,
     /// When this session began, and what time it is, by the arm's clock.
@@ -122,7 +128,9 @@ impl Session {
     fn beside(cell: Cell, opening: Opening) -> Result<Self, SessionError> {
         let guard = cell.guard(&opening.operator)?;
         let punctual = (cell.pace == Pace::RealTime).then(Punctual::default);
+        let zero = cell.zero_watch(Tool::none());
         Ok(Self {
+            zero,
             resuming: false,
             punctual,
             cell,
@@ -212,16 +220,22 @@ impl Session {
         self.event(Level::Info, text);
     }
 
-    /// After the arm stopped by itself or was stopped: makes it ready to move again, asks it where it is, and takes that
-    /// for the fresh confirmation that the guard wants. Nothing moves; whoever calls this has found the cause and
-    /// looked at the arm.
+    /// After the arm stopped by itself or was stopped: asks a person whether the cause was found; on a yes the arm is made
+    /// ready to move again, asked where it is, and the guard is told. Nothing moves, and what comes first is slow.
     ///
     /// # Errors
-    /// When the arm cannot be made ready, does not answer, or is not fit to move: the error says what to do first.
+    /// When nobody says yes, the arm cannot be made ready, does not answer, or is not fit to move: the error says what
+    /// to do first.
     pub fn recover(&mut self) -> Result<(), SessionError> {
         const STEP: &str = "recovering";
-        self.begin_exam("RECOVERY")?;
+        let question =
+            "Look at the arm. Was the cause of the stop found, and may it move again, slowly at first?";
+        if !self.opening.progress.confirm(question) {
+            return Err(SessionError::NotConfirmed { why: "nobody said yes".into() });
+        }
         let done = self.cell.arm.recover()?;
+        // Only now: what begins the exam asks the arm.
+        self.begin_exam("RECOVERY")?;
         self.say(&done);
         let state = self.ask_where(STEP, "recover")?;
         let refused = |trip: Trip| SessionError::Ended { step: STEP, why: trip.to_string() };

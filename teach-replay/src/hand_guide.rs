@@ -64,8 +64,14 @@ pub struct HandGuide {
     held_by: Option<Binding>,
     motion: Motion,
     stage: Stage,
+    /// The most that the probe is led at (m/s): little after a confirmation, then e times as much each second.
+    pace: f64,
     dt: f64,
 }
+
+/// After a confirmation the probe is led no faster at first (m/s): less than the guard's 10 mm/s, as joints that lag one
+/// behind the other may add some.
+const RESUMED_M_S: f64 = 0.0075;
 
 impl HandGuide {
     /// Hand guiding from the commanded joints `start`, at rest.
@@ -81,7 +87,7 @@ impl HandGuide {
         let dt = arm.period.seconds();
         let stage = Stage::Waiting { ticks: 0 };
         let motion = Motion::at_rest(dt);
-        Ok(Self { arm, settings, stepper, held_by: None, motion, stage, dt })
+        Ok(Self { arm, settings, stepper, held_by: None, motion, stage, pace: f64::INFINITY, dt })
     }
 
     /// The same, before it begins, the probe led nowhere outside of `workspace`.
@@ -91,6 +97,13 @@ impl HandGuide {
     pub fn within(mut self, workspace: Workspace) -> Result<Self, GuideError> {
         self.stepper = stepper(&self.arm, &self.settings, *self.stepper.limiter().position(), workspace)?;
         Ok(self)
+    }
+
+    /// The same, slow at first, then e times faster every second. After a stop.
+    #[must_use]
+    pub const fn slowly(mut self) -> Self {
+        self.pace = RESUMED_M_S;
+        self
     }
 
     /// The limit that the hand pushes against now.
@@ -113,9 +126,10 @@ impl HandGuide {
     }
 
     fn guide(&mut self, state: &State) -> Option<Joints> {
-        self.motion.feel(&self.settings, &state.wrench);
+        let settings = GiveWay { speed_m_s: self.settings.speed_m_s.min(self.pace), ..self.settings };
+        self.motion.feel(&settings, &state.wrench);
         let base_from_probe = self.arm.probe(self.stepper.limiter().position());
-        let (twist, freedom) = self.motion.twist(&self.settings, &base_from_probe);
+        let (twist, freedom) = self.motion.twist(&settings, &base_from_probe);
         // Not finite: the step refuses it; the arm comes to rest where it is.
         match self.stepper.lead(&twist, freedom) {
             Ok(stepped) => {
@@ -153,6 +167,7 @@ impl Controller for HandGuide {
             Stage::Guiding if !state.guiding => Stage::Braking,
             other => other,
         };
+        self.pace *= 1.0 + self.dt;
         let joints = match self.stage {
             Stage::Waiting { ticks } => self.wait(ticks),
             Stage::Guiding => self.guide(state),

@@ -1,6 +1,7 @@
 //! [`Calibration`]: where the image's plane is in the probe, for one setting of the machine, with its error.
 
 mod quality;
+mod setting_mm;
 
 use std::fs;
 use std::path::Path;
@@ -10,8 +11,9 @@ use probepath_frames::{FrameError, Image, NamedPose, Pose, Probe, Span};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::{PixelSpacing, Setting};
+use crate::Setting;
 pub use quality::{Covariance, DepthMm, ErrorsMm, FoundMm, PromisedMm, Quality, RepeatabilityMm, Water};
+pub use setting_mm::SettingMm;
 
 /// Settings that differ by less than this (m) are the same: a file prints what a machine rounds.
 const SAME_LENGTH_M: f64 = 1e-6;
@@ -122,18 +124,6 @@ struct Layout {
     error: CalibrationError,
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct SettingMm {
-    depth_mm: f64,
-    focus_mm: f64,
-    window_top_mm: f64,
-    window_height_mm: f64,
-    window_width_mm: f64,
-    pixel_x_mm: f64,
-    pixel_y_mm: f64,
-}
-
 impl Calibration {
     /// The calibration of a TOML text.
     ///
@@ -221,43 +211,6 @@ impl Calibration {
             check(found >= 0.0 && found.is_finite(), field, found, "zero or more")?;
         }
         self.quality.as_ref().map_or(Ok(()), Quality::check)
-    }
-}
-
-impl SettingMm {
-    fn of(setting: &Setting) -> Self {
-        Self {
-            depth_mm: mm(setting.depth_m),
-            focus_mm: mm(setting.focus_m),
-            window_top_mm: mm(setting.window_top_m),
-            window_height_mm: mm(setting.window_height_m),
-            window_width_mm: mm(setting.window_width_m),
-            pixel_x_mm: mm(setting.spacing.x_m),
-            pixel_y_mm: mm(setting.spacing.y_m),
-        }
-    }
-
-    fn metres(&self) -> Setting {
-        Setting {
-            depth_m: self.depth_mm / 1e3,
-            focus_m: self.focus_mm / 1e3,
-            window_top_m: self.window_top_mm / 1e3,
-            window_height_m: self.window_height_mm / 1e3,
-            window_width_m: self.window_width_mm / 1e3,
-            spacing: PixelSpacing { x_m: self.pixel_x_mm / 1e3, y_m: self.pixel_y_mm / 1e3 },
-        }
-    }
-
-    fn named(&self) -> [(&'static str, f64); 7] {
-        [
-            ("depth_mm", self.depth_mm),
-            ("focus_mm", self.focus_mm),
-            ("window_top_mm", self.window_top_mm),
-            ("window_height_mm", self.window_height_mm),
-            ("window_width_mm", self.window_width_mm),
-            ("pixel_x_mm", self.pixel_x_mm),
-            ("pixel_y_mm", self.pixel_y_mm),
-        ]
     }
 }
 

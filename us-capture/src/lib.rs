@@ -30,7 +30,7 @@ pub mod spatial;
 pub use bscan::{BScan, BadBScan, PixelSpacing, PlacedBScan, Setting};
 pub use calibration::{
     BadCalibration, Calibration, CalibrationError, Covariance, DepthMm, ErrorsMm, FoundMm, PromisedMm,
-    Quality, RepeatabilityMm, Water,
+    Quality, RepeatabilityMm, SettingMm, Water,
 };
 pub use capture::{Capture, CaptureError, Counts, Keeping};
 pub use pixel_map::{BadPixelMap, PixelMap};

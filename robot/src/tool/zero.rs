@@ -134,6 +134,11 @@ impl ZeroWatch {
         Err(ToolError::NotInAir { why, still_s: self.settings.still_s })
     }
 
+    /// What it goes by.
+    pub const fn settings(&self) -> &ZeroSettings {
+        &self.settings
+    }
+
     /// The tool as it is known now.
     pub const fn tool(&self) -> &Tool {
         &self.tool

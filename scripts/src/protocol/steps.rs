@@ -20,6 +20,7 @@ const USAGE: &[(&str, &str)] = &[
         "teach",
         "teach(#{ study: \"LEG-007\", side: \"left\" }), or with by: \"freedrive\", stay_within: mm(1)",
     ),
+    ("identify_tool", "identify_tool(): turns the probe in the air, and says what the arm carries"),
     ("load_path", "load_path(\"femoral.path.toml\")"),
     ("save", "path.save(\"femoral.path.toml\")"),
     ("trim", "path.trim(mm(10), mm(210))"),
@@ -52,6 +53,10 @@ pub(super) fn register(engine: &mut Engine, stage: &Stage) {
 }
 
 fn paths(engine: &mut Engine, stage: &Stage) {
+    let s = stage.clone();
+    engine.register_fn("identify_tool", move |context: NativeCallContext| -> Outcome<()> {
+        s.step(&context, Session::identify_tool).map(drop)
+    });
     engine.register_type_with_name::<TaughtPath>("Path");
     engine.register_get("length", |path: &mut TaughtPath| Length::from_si(path.length()));
     let s = stage.clone();

@@ -4,31 +4,35 @@ mod arm;
 mod file;
 mod line;
 mod machine;
+mod phantom;
 mod pose;
 mod served;
 mod workspace;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use probepath_frames::{Direction, Image, Point, Pose, Probe, Span, World};
+use probepath_frames::{Base, Direction, Image, Point, Pose, Probe, Span, World};
 use probepath_robot::drivers::Address;
 use probepath_robot::drivers::ur::{UrArm, UrSettings};
 use probepath_robot::{
-    Face, Guard, GuardLimits, Joints, Model, MotionLimits, Operator, Plane, Tilt, Workspace, probe_place,
+    Face, Guard, GuardLimits, Joints, Model, MotionLimits, Operator, Plane, Tilt, Tool, Workspace,
+    ZeroSettings, ZeroWatch, probe_place,
 };
-use probepath_sim::{Bench, SimulatedCell};
+use probepath_sim::SimulatedCell;
 use probepath_us_capture::exam::Pace;
 use probepath_us_capture::igtl::{IgtlSettings, IgtlSource, Wait};
 use probepath_us_capture::{BScanSource, Calibration, CalibrationError, Setting};
 
 pub use arm::{ArmFile, ControllerTime};
 pub use file::{CellFile, ForceFile, LimitsFile, StoredCalibration};
-pub use machine::{IGTL_PORT, MachineAddress, MachineClock, MachineFile, SettingFile};
+pub use machine::{IGTL_PORT, MachineAddress, MachineClock, MachineFile};
+pub use phantom::PhantomFile;
 pub use pose::PoseFile;
 pub use workspace::{BoxFile, PlaneFile, WorkspaceFile};
 
 use super::SessionError;
 use super::bedside::{Bedside, SimulatedBedside};
 use super::recorder::Facts;
+use phantom::OnTable;
 
 /// A connected cell: what moves, what sees, and what is known about both.
 pub(super) struct Cell {
@@ -44,7 +48,7 @@ pub(super) struct Cell {
     /// From the echoes to the arrival of a B-scan, as the cell's file says it.
     pub(super) image_latency: Span,
     /// The wire phantom on the table, where there is one, as its drawing and a tape measure have it.
-    pub(super) bench: Option<Bench>,
+    pub(super) bench: Option<OnTable>,
     /// The simulated cell behind arm and machine, where they are simulated in this process: its truth is asked after
     /// the reconstruction.
     pub(super) simulated: Option<SimulatedCell>,
@@ -60,7 +64,7 @@ struct Described {
     /// machine.
     image: Option<(Setting, Pose<Probe, Image>)>,
     image_latency: Span,
-    bench: Option<Bench>,
+    bench: Option<OnTable>,
 }
 
 impl Described {
@@ -77,16 +81,25 @@ impl Described {
             urdf: nominal.urdf.to_owned(),
             image: (file.machine.address != MachineAddress::None).then_some(image),
             image_latency: nominal.image_latency,
-            bench: nominal.bench.clone(),
+            bench: nominal.bench.clone().map(|bench| OnTable {
+                phantom: bench.phantom,
+                world_from_phantom: bench.world_from_phantom,
+                water_celsius: bench.water_celsius,
+            }),
         }
     }
 
     /// What the file of a cell on its wire says; `urdf` is the model's text, where it need not be read.
     fn on_its_wire(file: &CellFile, urdf: Option<&str>) -> Result<Self, SessionError> {
         let refused = |why: String| SessionError::Cell { file: file.name.clone(), why };
+        let recorded = urdf.is_some();
         let places = file.arm.places().map_err(|wrong| refused(wrong.told("")))?;
         let (model, urdf) = file.arm.model(urdf, &file.folder).map_err(|error| refused(error.to_string()))?;
         let setting = file.machine.setting.map(|setting| setting.metres());
+        // A recording needs none, and the drawing may be elsewhere by now.
+        let phantom = file.phantom.as_ref().filter(|_| !recorded);
+        let bench = phantom.map(|phantom| phantom.on_table(&file.folder)).transpose();
+        let bench = bench.map_err(|wrong| refused(wrong.told("")))?;
         Ok(Self {
             facts: Facts {
                 model,
@@ -96,13 +109,18 @@ impl Described {
             urdf,
             image: setting.map(|setting| (setting, as_drawn(&setting))),
             image_latency: Span::from_seconds(file.machine.latency_ms.unwrap_or_default() * 1e-3),
-            bench: None,
+            bench,
         })
     }
 }
 
 /// Connects to a UR controller.
 fn ur(file: &CellFile, host: &str, facts: &Facts) -> Result<UrArm, SessionError> {
+    Ok(UrArm::connect(host, ur_settings(file, facts)?)?)
+}
+
+/// What a UR controller is told.
+fn ur_settings(file: &CellFile, facts: &Facts) -> Result<UrSettings, SessionError> {
     let refused = |wrong: line::Wrong| SessionError::Cell { file: file.name.clone(), why: wrong.told("") };
     let carried = file.arm.carried().map_err(refused)?;
     let centre = Vector3::from(carried.centre_of_gravity_m);
@@ -110,8 +128,7 @@ fn ur(file: &CellFile, host: &str, facts: &Facts) -> Result<UrArm, SessionError>
     // The robot's own watchdog waits no less than our guard does: whichever is first, the arm stops.
     let heartbeat = file.arm.heartbeat_ms.map_or(Span::ZERO, |ms| Span::from_seconds(ms * 1e-3));
     let watchdog = usual.watchdog.max(heartbeat);
-    let settings = UrSettings { stepped: file.arm.time == ControllerTime::Simulated, watchdog, ..usual };
-    Ok(UrArm::connect(host, settings)?)
+    Ok(UrSettings { stepped: file.arm.time == ControllerTime::Simulated, watchdog, ..usual })
 }
 
 /// Connects to an ultrasound machine.
@@ -153,6 +170,18 @@ impl Cell {
             }
             Address::Ur { host } => Ok(Box::new(ur(file, host, &Described::on_its_wire(file, None)?.facts)?)),
         }
+    }
+
+    /// The arm of a cell on its wire after it stopped by itself: unlocked on a person's word, and connected; with what was
+    /// done, in words.
+    pub(super) fn arm_released(file: &CellFile) -> Result<(UrArm, Facts, String), SessionError> {
+        let Address::Ur { host } = &file.arm.address else {
+            return Err(SessionError::Order("only an arm on its wire can be unlocked"));
+        };
+        let facts = Described::on_its_wire(file, None)?.facts;
+        let arm = UrArm::connect_released(host, ur_settings(file, &facts)?)?;
+        let version = arm.report().version;
+        Ok((arm, facts, format!("The controller (PolyScope {version}) is unlocked, and lets the arm move.")))
     }
 
     /// The cell that an exam was recorded in, its recording in place of arm and machine; `urdf` is the exam's.
@@ -256,10 +285,19 @@ impl Cell {
         self.file.workspace.with(Workspace::new().and(table), &base_from_world)
     }
 
+    /// Where things fall to.
+    pub(super) fn down(&self) -> Direction<Base> {
+        self.facts.world_from_base.inverse() * Direction::<World>::y()
+    }
+
+    /// A watch over the force sensor's zero, for a tool that hangs on it.
+    pub(super) fn zero_watch(&self, tool: Tool) -> ZeroWatch {
+        ZeroWatch::new(tool, self.down(), ZeroSettings::default(), self.arm.period())
+    }
+
     /// How far the probe may lean over.
     fn tilt(&self) -> Tilt {
-        let base_from_world = self.facts.world_from_base.inverse();
-        let usual = Tilt::around(base_from_world * Direction::<World>::y());
+        let usual = Tilt::around(self.down());
         let most_rad = self.file.workspace.tilt_deg.map_or(usual.most_rad, f64::to_radians);
         Tilt { most_rad, ..usual }
     }

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use probepath_recon::ReconError;
-use probepath_robot::RunError;
 use probepath_robot::drivers::ur::UrError;
+use probepath_robot::{RunError, ToolError};
 use probepath_sim::CellError;
 use probepath_teach_replay::{GuideError, PathError, PlanError, ReplayError};
 use probepath_us_capture::exam::ExamError;
@@ -120,7 +120,8 @@ pub enum SessionError {
     Reconstruction(#[from] ReconError),
     /// The cell has no phantom to calibrate on.
     #[error(
-        "the cell has no wire phantom: name one under [simulated.subject.wire_phantom] in the cell's file"
+        "the cell has no wire phantom: name one under [phantom] in the cell's file, of a simulated cell under \
+         [simulated.subject.wire_phantom]"
     )]
     NoPhantom,
     /// The cell has no ultrasound machine.
@@ -131,6 +132,9 @@ pub enum SessionError {
     /// The landmarks that were touched say no place.
     #[error("the phantom's landmarks: {0}")]
     Pointer(#[from] PointerError),
+    /// What hangs on the force sensor cannot be told, or its zero not be taken.
+    #[error("the tool: {0}")]
+    Tool(#[from] ToolError),
     /// No plan for a calibration.
     #[error("nothing was moved: {0}")]
     NoPlan(#[from] NoPlan),

@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::net::{IpAddr, Ipv4Addr};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use probepath_frames::{Span, Stamp};
@@ -82,7 +82,7 @@ impl MeasureRequest {
     /// # Errors
     /// When the arm keeps no time of its own, cannot be reached or stops answering, or no thread can be started.
     pub fn run(&self) -> Result<Measured, SessionError> {
-        let file = self.file()?;
+        let file = cell_file(self.address.as_deref(), self.cell.as_deref())?;
         if file.is_simulated() {
             let wanted =
                 "an arm that is simulated in this process keeps no time: name one on its wire".to_owned();
@@ -90,23 +90,22 @@ impl MeasureRequest {
         }
         measure(&file, self.seconds)
     }
+}
 
-    fn file(&self) -> Result<CellFile, SessionError> {
-        let address = self.address.as_deref().map(str::parse::<Address>).transpose().map_err(|error| {
-            SessionError::Wish {
-                what: "the arm's address",
-                value: error.given.clone(),
-                wanted: error.to_string(),
-            }
-        })?;
-        let mut file = match (&self.cell, &address) {
-            (Some(cell), _) => CellFile::read(cell)?,
-            (None, Some(Address::Ur { host })) => served_here(host)?,
-            (None, _) => CellFile::default(),
-        };
-        file.arm.address = address.unwrap_or(file.arm.address);
-        Ok(file)
-    }
+/// The cell of a file, its arm at another address where one is given; without a file the cell that comes along.
+pub(super) fn cell_file(address: Option<&str>, cell: Option<&Path>) -> Result<CellFile, SessionError> {
+    let address = address.map(str::parse::<Address>).transpose().map_err(|error| SessionError::Wish {
+        what: "the arm's address",
+        value: error.given.clone(),
+        wanted: error.to_string(),
+    })?;
+    let mut file = match (cell, &address) {
+        (Some(cell), _) => CellFile::read(cell)?,
+        (None, Some(Address::Ur { host })) => served_here(host)?,
+        (None, _) => CellFile::default(),
+    };
+    file.arm.address = address.unwrap_or(file.arm.address);
+    Ok(file)
 }
 
 /// The cell that comes along, served on this computer.

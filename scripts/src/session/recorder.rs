@@ -4,7 +4,9 @@
 use std::borrow::Cow;
 
 use probepath_frames::{Base, Flange, Pose, Probe, Span, Stamp, Track, World};
-use probepath_robot::{Arm, ArmFault, Command, Joints, Model, Operator, Safety, State, Tick, Wish};
+use probepath_robot::{
+    Arm, ArmFault, Command, Joints, Model, Operator, Safety, State, Tick, Wish, ZeroWatch,
+};
 use probepath_teach_replay::{Recording, Sample};
 use probepath_us_capture::exam::{ExamWriter, Row, TickRecord};
 use probepath_us_capture::{BScanSource, Capture, CaptureError, PlacedBScan};
@@ -127,6 +129,8 @@ pub(super) struct Recorder<'a> {
     pub(super) track: Option<&'a mut Track<World, Probe>>,
     pub(super) eye: Option<Eye<'a>>,
     pub(super) figures: Option<&'a mut Figures>,
+    /// Learns where something was felt.
+    pub(super) zero: Option<&'a mut ZeroWatch>,
     /// The last tick's stamp.
     pub(super) now: Stamp,
 }
@@ -139,6 +143,9 @@ impl Watcher for Recorder<'_> {
         let state = &tick.state;
         let base_from_probe = self.facts.base_from_probe(&state.position);
         self.now = state.stamp;
+        if let Some(zero) = &mut self.zero {
+            zero.step(&state.wrench, &base_from_probe);
+        }
         if let Some(recording) = &mut self.recording {
             let (stamp, wrench, guiding) = (state.stamp, state.wrench, state.guiding);
             recording.push(Sample { stamp, base_from_probe, wrench, guiding });

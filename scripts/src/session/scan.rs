@@ -122,7 +122,11 @@ impl Session {
     /// Replays what is left of a scan under way; a stop keeps what it brought.
     pub(super) fn go_along(&mut self, mut underway: Underway, replay: Replay) -> Result<Scan, SessionError> {
         match self.replay(replay, &mut underway) {
-            Ok(()) => self.finished(underway),
+            Ok(()) => {
+                let scan = self.finished(underway)?;
+                self.look_at_zero()?;
+                Ok(scan)
+            }
             Err(error) => {
                 // Only where the guard wants a confirmation is there something to go on with.
                 if let Phase::Stopped(_) = self.guard.phase() {
@@ -238,6 +242,7 @@ impl Session {
             track: None,
             eye,
             figures: Some(figures),
+            zero: Some(&mut self.zero),
             now: self.now,
         };
         let done = motion::perform(moving, &mut replay, &mut self.guard, &mut recorder);

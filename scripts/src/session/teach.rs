@@ -116,7 +116,8 @@ impl Session {
         let mut controller: Box<dyn Controller + Send> = match by {
             GuideBy::Compliance => {
                 let guide = HandGuide::new(arm, &start, GiveWay::default())?;
-                Box::new(guide.within(self.cell.workspace())?)
+                let guide = guide.within(self.cell.workspace())?;
+                Box::new(if self.resuming { guide.slowly() } else { guide })
             }
             GuideBy::Freedrive => Box::new(Freedrive::new(arm.period.seconds())),
         };
@@ -134,10 +135,12 @@ impl Session {
             track: None,
             eye: None,
             figures: None,
+            zero: Some(&mut self.zero),
             now: self.now,
         };
         let done = motion::perform(moving, &mut *controller, &mut self.guard, &mut recorder);
         self.now = recorder.now;
+        self.resuming &= done.is_err();
         self.guard.set_limits(usual);
         done
     }

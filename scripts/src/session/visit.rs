@@ -164,6 +164,7 @@ impl Session {
         let (arm, operator) = (self.cell.probe_arm(), self.opening.operator.clone());
         let stops = visits.stops(wish, &self.cell.facts.world_from_base.inverse());
         let round = Round::new(&stops, &arm, (&start, &start), &settings, operator)?;
+        let round = if self.resuming { round.slowly() } else { round };
         self.say(&format!("Visiting {} places: {:.0} s.", stops.len(), round.duration_s()));
         let usual = *self.guard.limits();
         self.guard.set_limits(self.cell.as_the_file_says(limits_in_water(wish.speed_m_s)));
@@ -232,10 +233,12 @@ impl Session {
             track: Some(&mut track),
             eye: Some(eye),
             figures: None,
+            zero: None,
             now: self.now,
         };
         let done = motion::perform(moving, &mut round, &mut self.guard, &mut recorder);
         self.now = recorder.now;
+        self.resuming &= done.is_err();
         done?;
         if watch.status().phase == RoundPhase::StartMoved {
             let why = "the arm moved between planning and starting: plan again".to_owned();

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::arm::ArmFile;
 use super::line::{Wrong, line_of, positive, within};
 use super::machine::{MachineAddress, MachineFile};
+use super::phantom::PhantomFile;
 use super::workspace::WorkspaceFile;
 use crate::session::SessionError;
 
@@ -33,6 +34,9 @@ pub struct CellFile {
     pub arm: ArmFile,
     /// The ultrasound machine: where it is, and how it is set.
     pub machine: MachineFile,
+    /// The phantom of wires on the table, for a cell on its wire.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub phantom: Option<PhantomFile>,
     /// The arm's limits beyond its URDF.
     pub limits: LimitsFile,
     /// The force limits of the guard.
@@ -85,6 +89,7 @@ impl Default for CellFile {
             folder: PathBuf::new(),
             arm: ArmFile::default(),
             machine: MachineFile::default(),
+            phantom: None,
             limits: LimitsFile::default(),
             force: ForceFile::default(),
             above_table_mm: 20.0,
@@ -182,12 +187,18 @@ impl CellFile {
         self.arm.check()?;
         self.machine.check()?;
         self.workspace.check()?;
+        self.phantom.as_ref().map_or(Ok(()), PhantomFile::check)?;
         self.together()
     }
 
     /// A machine that is simulated in this process sees only an arm that is.
     fn together(&self) -> Result<(), Wrong> {
         let (arm, machine) = (&self.arm.address, &self.machine.address);
+        if let (Address::Simulated, Some(_)) = (arm, &self.phantom) {
+            let why = "is given, and the arm's address is \"sim\": the phantom of a cell that is simulated in this process \
+                       is described under [simulated.subject.wire_phantom]";
+            return Err(Wrong::new("phantom", why));
+        }
         let why = match (arm, machine) {
             (Address::Ur { .. }, MachineAddress::Sim) => {
                 "is \"sim\", and the arm's is not: a machine simulated in this process cannot see an arm on its wire; \

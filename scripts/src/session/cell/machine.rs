@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use probepath_us_capture::{PixelSpacing, Setting, igtl};
+use probepath_us_capture::{SettingMm, igtl};
 use serde::{Deserialize, Serialize};
 
 use super::arm::is_host;
@@ -72,27 +72,7 @@ pub struct MachineFile {
     pub holder_error_mm: Option<f64>,
     /// How it is set.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub setting: Option<SettingFile>,
-}
-
-/// How a machine is set (mm).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SettingFile {
-    /// Scan depth under the transducer's face (mm).
-    pub depth_mm: f64,
-    /// Depth of the transmit focus (mm).
-    pub focus_mm: f64,
-    /// Depth of the picture's first row under the face (mm).
-    pub window_top_mm: f64,
-    /// Height of the picture (mm).
-    pub window_height_mm: f64,
-    /// Width of the picture (mm).
-    pub window_width_mm: f64,
-    /// Size of a pixel along a row (mm).
-    pub pixel_x_mm: f64,
-    /// Size of a pixel along a column (mm).
-    pub pixel_y_mm: f64,
+    pub setting: Option<SettingMm>,
 }
 
 impl MachineFile {
@@ -109,7 +89,7 @@ impl MachineFile {
         within("machine.latency_ms", latency_ms, (0.0, 2000.0), "ms")?;
         let error_mm = self.holder_error_mm.ok_or_else(|| missing("machine.holder_error_mm"))?;
         within("machine.holder_error_mm", error_mm, (0.0, 20.0), "mm")?;
-        self.setting.as_ref().ok_or_else(|| missing("machine.setting"))?.check()
+        can_be(self.setting.as_ref().ok_or_else(|| missing("machine.setting"))?)
     }
 
     fn says_nothing(&self) -> Result<(), Wrong> {
@@ -130,51 +110,24 @@ impl MachineFile {
     }
 }
 
-impl SettingFile {
-    /// A setting as it is written in a file.
-    pub fn of(setting: &Setting) -> Self {
-        let mm = |metres: f64| metres * 1e3;
-        Self {
-            depth_mm: mm(setting.depth_m),
-            focus_mm: mm(setting.focus_m),
-            window_top_mm: mm(setting.window_top_m),
-            window_height_mm: mm(setting.window_height_m),
-            window_width_mm: mm(setting.window_width_m),
-            pixel_x_mm: mm(setting.spacing.x_m),
-            pixel_y_mm: mm(setting.spacing.y_m),
-        }
+/// Whether a machine can be set so.
+fn can_be(setting: &SettingMm) -> Result<(), Wrong> {
+    let field = |name: &str| format!("machine.setting.{name}");
+    within(&field("depth_mm"), setting.depth_mm, (5.0, 400.0), "mm")?;
+    within(&field("focus_mm"), setting.focus_mm, (0.5, 400.0), "mm")?;
+    within(&field("window_top_mm"), setting.window_top_mm, (0.0, setting.depth_mm), "mm")?;
+    // What reading rounds is no window beyond the depth.
+    let left_mm = setting.depth_mm - setting.window_top_mm + 1e-6;
+    within(&field("window_height_mm"), setting.window_height_mm, (1.0, left_mm), "mm")?;
+    within(&field("window_width_mm"), setting.window_width_mm, (1.0, 400.0), "mm")?;
+    for (name, mm, side_mm) in [
+        ("pixel_x_mm", setting.pixel_x_mm, setting.window_width_mm),
+        ("pixel_y_mm", setting.pixel_y_mm, setting.window_height_mm),
+    ] {
+        positive(&field(name), mm)?;
+        within(&field(name), mm, (1e-3, side_mm / 8.0), "mm")?;
     }
-
-    /// The setting in metres.
-    pub fn metres(&self) -> Setting {
-        Setting {
-            depth_m: self.depth_mm / 1e3,
-            focus_m: self.focus_mm / 1e3,
-            window_top_m: self.window_top_mm / 1e3,
-            window_height_m: self.window_height_mm / 1e3,
-            window_width_m: self.window_width_mm / 1e3,
-            spacing: PixelSpacing { x_m: self.pixel_x_mm / 1e3, y_m: self.pixel_y_mm / 1e3 },
-        }
-    }
-
-    fn check(&self) -> Result<(), Wrong> {
-        let field = |name: &str| format!("machine.setting.{name}");
-        within(&field("depth_mm"), self.depth_mm, (5.0, 400.0), "mm")?;
-        within(&field("focus_mm"), self.focus_mm, (0.5, 400.0), "mm")?;
-        within(&field("window_top_mm"), self.window_top_mm, (0.0, self.depth_mm), "mm")?;
-        // What reading rounds is no window beyond the depth.
-        let left_mm = self.depth_mm - self.window_top_mm + 1e-6;
-        within(&field("window_height_mm"), self.window_height_mm, (1.0, left_mm), "mm")?;
-        within(&field("window_width_mm"), self.window_width_mm, (1.0, 400.0), "mm")?;
-        for (name, mm, side_mm) in [
-            ("pixel_x_mm", self.pixel_x_mm, self.window_width_mm),
-            ("pixel_y_mm", self.pixel_y_mm, self.window_height_mm),
-        ] {
-            positive(&field(name), mm)?;
-            within(&field(name), mm, (1e-3, side_mm / 8.0), "mm")?;
-        }
-        Ok(())
-    }
+    Ok(())
 }
 
 impl TryFrom<String> for MachineAddress {

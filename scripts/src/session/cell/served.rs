@@ -2,11 +2,13 @@
 
 use std::net::IpAddr;
 
-use probepath_sim::{ArmKind, SimulatedCell};
+use probepath_sim::{ArmKind, SimulatedCell, SubjectConfig};
+use probepath_us_capture::SettingMm;
 
 use super::arm::{ArmFile, ControllerTime};
 use super::file::CellFile;
-use super::machine::{IGTL_PORT, MachineAddress, MachineClock, MachineFile, SettingFile};
+use super::machine::{IGTL_PORT, MachineAddress, MachineClock, MachineFile};
+use super::phantom::PhantomFile;
 use super::pose::PoseFile;
 use probepath_robot::drivers::Address;
 
@@ -39,10 +41,21 @@ impl CellFile {
             latency_ms: Some(nominal.image_latency.nanoseconds() as f64 / 1e6),
             clock: Some(MachineClock::Arm),
             holder_error_mm: Some(config.machine.calibration_error_mm),
-            setting: Some(SettingFile::of(&nominal.setting)),
+            setting: Some(SettingMm::of(&nominal.setting)),
         };
-        Self { name: name.into(), arm, machine, ..Self::default() }
+        let phantom = nominal.bench.as_ref().zip(named(cell)).map(|(bench, model)| PhantomFile {
+            model,
+            water_celsius: bench.water_celsius,
+            world_from_phantom: PoseFile::of(&bench.world_from_phantom),
+        });
+        Self { name: name.into(), arm, machine, phantom, ..Self::default() }
     }
+}
+
+/// The phantom's name or file, where it is not drawn in the cell's own file.
+fn named(cell: &SimulatedCell) -> Option<String> {
+    let SubjectConfig::WirePhantom(config) = &cell.config().subject else { return None };
+    (!config.phantom.contains('\n')).then(|| config.phantom.clone())
 }
 
 /// How late a state of a simulated controller on the same computer may be (ms).

@@ -99,6 +99,16 @@ window_width_mm = 38.0
 pixel_x_mm = 0.06
 pixel_y_mm = 0.06
 
+[phantom]
+model = "z-19"
+water_celsius = 21.0
+
+[phantom.world_from_phantom]
+written_in = "World"
+of = "Phantom"
+translation_mm = [100.0, -50.0, 0.0]
+rotation_deg = [0.0, 0.0, 0.0]
+
 [workspace.box]
 low_mm = [-400.0, -500.0, -600.0]
 high_mm = [500.0, 0.0, 400.0]
@@ -165,12 +175,28 @@ fn every_wrong_field_is_refused_with_its_line_and_its_name() {
         ("low_mm = [-400.0", "low_mm = [600.0", "workspace.box.high_mm"),
         ("inward = [-1.0, 0.0, 0.0]", "inward = [0.0, 0.0, 0.0]", "workspace.planes has no `inward`"),
         ("name = \"a UR beside the table\"", "[simulated]\nseed = 1", "seed"),
+        ("water_celsius = 21.0", "water_celsius = 294.0", "phantom.water_celsius is 294"),
+        ("of = \"Phantom\"", "of = \"Probe\"", "phantom.world_from_phantom is no pose"),
     ];
     for (right, written, said) in wrong {
         assert!(ON_ITS_WIRE.contains(right), "{right}");
         let text = refused(&ON_ITS_WIRE.replace(right, written));
         assert!(text.contains("cell.toml") && text.contains(said), "{written}: {text}");
     }
+}
+
+#[test]
+fn a_phantom_on_the_table_is_found_by_its_name_and_one_that_is_none_is_named() {
+    let file = CellFile::parse(ON_ITS_WIRE, "cell.toml").unwrap();
+    let bench = Described::on_its_wire(&file, None).unwrap().bench.unwrap();
+    assert!((bench.water_celsius - 21.0).abs() < 1e-12 && !bench.phantom.wires.is_empty());
+    assert!((bench.world_from_phantom.origin().vector().y + 0.05).abs() < 1e-12);
+    let none = CellFile::parse(&ON_ITS_WIRE.replace("model = \"z-19\"", "model = \"no.toml\""), "cell.toml");
+    let error = Described::on_its_wire(&none.unwrap(), None).err().unwrap().to_string();
+    assert!(error.contains("phantom.model is \"no.toml\"") && error.contains("come along"), "{error}");
+    let here = ON_ITS_WIRE.split_once("[phantom]").unwrap().1;
+    let text = refused(&format!("[phantom]{}", here.split_once("[workspace").unwrap().0));
+    assert!(text.contains("[simulated.subject.wire_phantom]"), "{text}");
 }
 
 #[test]
