@@ -3,6 +3,7 @@ use probepath_frames::{Phantom, World};
 use proptest::prelude::*;
 
 use super::*;
+use crate::PixelSpacing;
 
 fn calibration() -> Calibration {
     Calibration {
