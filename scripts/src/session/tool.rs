@@ -4,7 +4,7 @@ use std::fmt;
 
 use nalgebra::{Isometry3, Vector3};
 use probepath_frames::{Base, Flange, Point, Pose, Probe, Stamp, Wrench};
-use probepath_robot::{Air, Tick, ToolFit, ToolReading, Wish, identify};
+use probepath_robot::{Air, Tick, ToolError, ToolFit, ToolReading, Wish, identify};
 use probepath_teach_replay::{PlanSettings, Round, RoundPhase, Stop};
 use serde::Serialize;
 
@@ -25,6 +25,8 @@ const TILTS_DEG: [(f64, f64); 9] = [
     (18.0, -18.0),
     (0.0, 0.0),
 ];
+/// With fewer that can be reached nothing moves.
+const LEAST_POSES: usize = 6;
 /// How fast (m/s), how long it rests before the sensor is read, and how long it is read (s).
 const SPEED_M_S: f64 = 0.05;
 const SETTLE_S: f64 = 0.6;
@@ -79,6 +81,9 @@ impl Session {
         let stops: Vec<Stop> = TILTS_DEG.iter().map(|tilt| stop(&here, *tilt)).collect();
         let can = |stop: &Stop| arm.posture(&stop.base_from_probe, &start, &settings).is_ok();
         let stops: Vec<Stop> = stops.into_iter().filter(can).collect();
+        if stops.len() < LEAST_POSES {
+            return Err(ToolError::TooFew { given: stops.len(), wanted: LEAST_POSES }.into());
+        }
         let round = Round::new(&stops, &arm, (&start, &start), &settings, self.opening.operator.clone())?;
         let round = if self.resuming { round.slowly() } else { round };
         self.say(&format!(
