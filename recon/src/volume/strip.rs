@@ -35,8 +35,8 @@ pub(super) struct Strip {
     index: [u32; MOST],
     fraction: [[u32; MOST]; 3],
     ends: [u16; MOST],
-    greys: [u32; MOST + 1],
-    weights: [u32; MOST + 1],
+    greys: [u32; 2 * MOST],
+    weights: [u32; 2 * MOST],
     levels: [u32; 256],
 }
 
@@ -46,8 +46,8 @@ impl Strip {
             index: [0; MOST],
             fraction: [[0; MOST]; 3],
             ends: [0; MOST],
-            greys: [0; MOST + 1],
-            weights: [0; MOST + 1],
+            greys: [0; 2 * MOST],
+            weights: [0; 2 * MOST],
             levels: [0; 256],
         }
     }
@@ -90,7 +90,8 @@ impl Strip {
         runs + 1
     }
 
-    /// Sums from the stretch's beginning up to each pixel.
+    /// Sums from the stretch's beginning up to each pixel. There is room for twice as many, because a power of two is
+    /// stayed within for nothing.
     pub(super) fn sum(&mut self, pixels: &Pixels<'_>) {
         let mut sum = 0;
         match pixels.weight {
@@ -125,12 +126,12 @@ impl Strip {
 
     /// The sum of the (weighted) grey levels of a run.
     pub(super) fn greys(&self, run: Range<usize>) -> u32 {
-        self.greys[run.end % (MOST + 1)].wrapping_sub(self.greys[run.start % (MOST + 1)])
+        self.greys[run.end % (2 * MOST)].wrapping_sub(self.greys[run.start % (2 * MOST)])
     }
 
     /// The sum of the weights of a run.
     pub(super) fn weights(&self, run: Range<usize>) -> u32 {
-        self.weights[run.end % (MOST + 1)].wrapping_sub(self.weights[run.start % (MOST + 1)])
+        self.weights[run.end % (2 * MOST)].wrapping_sub(self.weights[run.start % (2 * MOST)])
     }
 
     /// Where in its voxel a pixel lies, in 1024ths.
