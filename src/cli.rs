@@ -1,11 +1,13 @@
 //! What can be typed.
 
 mod calibrate;
+mod volume;
 
 use std::path::PathBuf;
 
 pub use calibrate::{Calibrate, Check, Spatial, Subject, Temporal};
 use clap::{Args, Parser, Subcommand};
+pub use volume::VolumeArgs;
 
 /// An ultrasound probe on a robot arm: taught by hand, replayed at constant force, reconstructed in 3D.
 /// Without a command it scans the simulated leg. A research tool, not a medical device.
@@ -81,6 +83,9 @@ pub struct Reconstruct {
     /// A place in the lumen of the first image: right of its first column and below its first row (mm). Found otherwise.
     #[arg(long, value_name = "X,Y", value_delimiter = ',', num_args = 2)]
     pub seed_mm: Option<Vec<f64>>,
+    /// How.
+    #[command(flatten)]
+    pub volume_options: VolumeArgs,
     /// A program that finds the lumen in the place of probepath's own finder (a .py is run with Python): it gets images
     /// and answers contours. docs/reconstruction.md says how.
     #[arg(long, value_name = "PROGRAM")]

@@ -18,10 +18,13 @@
 //!
 //! The nouns: a [`Slice`] is an image with the places of its pixels; a [`Grid`] says where the voxels are;
 //! [`VolumeSettings`] say how pixels become voxels; a [`Volume`] holds grey levels, and for every voxel whether it was
-//! [`seen`](Mark::Seen), [`filled`](Mark::Filled) or neither.
+//! [`seen`](Mark::Seen), [`filled`](Mark::Filled) or neither. What does not fit into memory is built and written as
+//! [`Tiles`]; a [`LiveVolume`] grows while the sweep goes on; a [`Cut`] is an image out of a volume; a [`SpeckleVolume`]
+//! is made of several sweeps over the same tissue.
 //!
 //! Sums are of integers, so the result depends neither on the order of the images (but for `Latest`, which is about
-//! order) nor on the number of threads. What it does not do: deform, register, or show.
+//! order, and holes between neighbours) nor on the number of threads, nor on being built in parts. What it does not do:
+//! deform, register, or show.
 
 mod clip;
 mod compound;

@@ -11,12 +11,14 @@ mod follow_up;
 mod reconstruct;
 mod simulate;
 
+pub use probepath_recon::volume::{Compounding, Weights};
+
 pub use arm::{ArmAnswer, ArmError, ArmQuestion, arm};
 pub use compare::{CompareError, CompareWish, Comparison, Fit, compare};
 pub use convert::{ConvertError, Converted, convert};
 pub use follow_up::{FollowedUp, FollowedUpError, followed_up};
 pub use reconstruct::{
     FinderFault, FinderWish, ImagesOf, ReconstructError, ReconstructWish, Reconstructed, Timing, VolumeMade,
-    reconstruct,
+    VolumeOptions, reconstruct,
 };
 pub use simulate::{Served, ServedArm, ServedPort, SimulateError, SimulateRequest, Simulating, simulate};

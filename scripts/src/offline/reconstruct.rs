@@ -25,7 +25,7 @@ pub use error::ReconstructError;
 use finder::LumenProcess;
 pub use finder::{FinderFault, FinderWish};
 use input::Input;
-pub use volume::VolumeMade;
+pub use volume::{VolumeMade, VolumeOptions};
 
 /// What is to be reconstructed, and from what.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -38,6 +38,8 @@ pub struct ReconstructWish {
     pub volume: bool,
     /// A place in the lumen of the first image: right of its first column and below its first row (mm).
     pub seed_mm: Option<(f64, f64)>,
+    /// How, where it is said.
+    pub volume_options: VolumeOptions,
     /// A program that finds the lumen in the place of our own finder.
     pub lumen: Option<FinderWish>,
     /// Folder for what is made.
@@ -147,7 +149,7 @@ pub fn reconstruct(
     }
     if wish.volume {
         progress.at("building the volume", 0.8);
-        let build = || volume::build(&input.slices(), &input.volume, &wish.out);
+        let build = || volume::build(&input.slices(), &input.volume, &wish.volume_options, &wish.out);
         made.volume = Some(timed(&mut timing.volume, build)?);
     }
     timing.total = begun.elapsed().as_secs_f64();

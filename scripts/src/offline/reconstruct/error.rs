@@ -46,6 +46,14 @@ pub enum ReconstructError {
     /// The volume.
     #[error(transparent)]
     Volume(#[from] VolumeError),
+    /// The table of what each part of an image counts.
+    #[error("{}: no table of importance: {why}", path.display())]
+    Importance {
+        /// Its file.
+        path: PathBuf,
+        /// Why.
+        why: String,
+    },
     /// The lumen.
     #[error("{}: {source}", path.display())]
     Lumen {
