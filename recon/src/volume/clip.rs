@@ -57,7 +57,7 @@ impl Clip {
         self.weights.as_ref()?.get(pixels)
     }
 
-    /// Whether the pixel nearest to a place is used.
+    /// Whether the pixel nearest to a place is used, and counts anything.
     pub(super) fn holds(&self, column: f64, row: f64) -> bool {
         let (column, row) = ((column + 0.5).floor(), (row + 0.5).floor());
         if !(column >= 0.0 && row >= 0.0 && row < self.height as f64) {
@@ -68,7 +68,9 @@ impl Clip {
             (Some(first), Some(end)) => self.runs.get(*first..*end).unwrap_or_default(),
             _ => &[],
         };
-        runs.iter().any(|(_, run)| run.contains(&column))
+        let counts =
+            |weights: &Vec<u8>| weights.get(row * self.width + column).is_some_and(|weight| *weight > 0);
+        runs.iter().any(|(_, run)| run.contains(&column)) && self.weights.as_ref().is_none_or(counts)
     }
 
     /// Rows with their runs, from the top.

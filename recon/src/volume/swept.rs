@@ -62,7 +62,9 @@ impl Sweep {
 
     fn clip(&mut self, slice: &Slice<'_>, settings: &VolumeSettings) -> usize {
         let size = (slice.width, slice.height());
-        Clip::number(&mut self.clips, size, |width, height| Clip::of(&settings.region, width, height))
+        Clip::number(&mut self.clips, size, |width, height| {
+            Clip::of(&settings.region, width, height).weighted(settings.importance.as_ref())
+        })
     }
 
     /// What is kept (bytes).
