@@ -96,14 +96,14 @@ fn a_stenosis_that_grew_is_found_where_it_is_and_by_how_much() {
         let part = |p: f64| 1.0 - 0.5 * p * (1.0 + (std::f64::consts::TAU * off / 18.0).cos());
         if off < 9.0 { part(0.75) / part(0.6) } else { 1.0 }
     };
-    let mut outside = Vec::new();
+    let (mut outside, mut seen) = (Vec::new(), 0);
     for seed in 0..40 {
         let mut dice = Dice(seed);
         let earlier = exam(&mut dice, [0.0, 130.0], same);
         let later = moved(exam(&mut dice, [5.0, 130.0], grown));
         let found = follow_up(&earlier, &later).expect("the same vessel");
         let hit = found.changed.iter().find(|stretch| (stretch.most.at_mm - 40.0).abs() < 5.0);
-        assert!(hit.is_some_and(|stretch| stretch.most.score() < 0.0), "{seed}: {:?}", found.changed);
+        seen += usize::from(hit.is_some_and(|stretch| stretch.most.score() < 0.0));
         let [first, second] = &found.stenoses[..] else { panic!("{seed}: {:?}", found.stenoses) };
         let [low, high] = first.points_interval.expect("in both");
         assert!(low > 0.0, "{seed}: {low} {high}");
@@ -115,6 +115,8 @@ fn a_stenosis_that_grew_is_found_where_it_is_and_by_how_much() {
             outside.push((seed, low, high));
         }
     }
+    // It is 4.8 standard deviations on average, the limit 3.3: one in ten stays below.
+    assert!(seen >= 30, "{seen} of 40");
     // 15 points more, and the other as it was: 4 of 80 intervals miss that by chance.
     assert!(outside.len() <= 8, "{outside:?}");
 }
