@@ -44,7 +44,8 @@ fn is_one(stenosis: &Stenosis, least_percent_area: f64) -> bool {
     stenosis.percent_area >= least_percent_area && stenosis.percent_area > 3.0 * stenosis.percent_area_sd
 }
 
-/// Every stretch that is narrower than what lies beside it, the narrowest first; none inside another.
+/// Every stretch that is narrower than what lies beside it, the narrowest first; none inside another, and none that
+/// reaches across a narrower place: where a branch leaves, the vessel beyond would be one long narrowing.
 fn narrowings(places: &[Place], hardly: f64) -> Vec<Narrowing> {
     let mut minima: Vec<usize> = (0..places.len()).filter(|&i| is_minimum(places, i)).collect();
     minima.sort_by(|&a, &b| places[a].smooth.total_cmp(&places[b].smooth));
@@ -55,7 +56,8 @@ fn narrowings(places: &[Place], hardly: f64) -> Vec<Narrowing> {
             continue;
         }
         let narrowing = Narrowing { narrowest, ends: shoulders(places, narrowest) };
-        if narrowing.depth(places) > hardly {
+        let across = found.iter().any(|other| narrowing.spans(places, places[other.narrowest].at));
+        if !across && narrowing.depth(places) > hardly {
             found.push(narrowing);
         }
     }
