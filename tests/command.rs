@@ -136,7 +136,7 @@ fn the_real_spine_becomes_a_volume() {
     ]);
     assert_eq!(made.status.code(), Some(0), "{}", String::from_utf8_lossy(&made.stderr));
     let document: serde_json::Value = serde_json::from_slice(&made.stdout).unwrap();
-    assert_eq!(document["images"], 21);
+    assert_eq!(document["images"]["total"], 21);
     let ours = probepath_recon::volume::Volume::read(&out.join("volume.mha"), 1 << 30).unwrap();
     let reference = format!("{data}/vtkVolumeReconstructorTestNNLATEvolumeRef.mha");
     let theirs = probepath_recon::volume::Volume::read(reference.as_ref(), 1 << 30).unwrap();

@@ -26,6 +26,9 @@ pub struct VolumeArgs {
     /// Memory the volume may take, beside the images; what is larger is built and written in parts. 2147 MB.
     #[arg(long, value_name = "MB", requires = "volume")]
     pub memory_mb: Option<u64>,
+    /// Room on the disk the volume may take; what is larger is refused before it is begun. 8000 MB.
+    #[arg(long, value_name = "MB", requires = "volume")]
+    pub disk_mb: Option<u64>,
     /// Write the volume as NRRD, not MHA.
     #[arg(long, requires = "volume")]
     pub nrrd: bool,
@@ -72,6 +75,7 @@ impl From<VolumeArgs> for VolumeOptions {
             fill_mm: args.fill_mm,
             importance: args.importance,
             memory_mb: args.memory_mb,
+            disk_mb: args.disk_mb,
             nrrd: args.nrrd,
         }
     }

@@ -46,6 +46,19 @@ pub enum ReconstructError {
     /// The volume.
     #[error(transparent)]
     Volume(#[from] VolumeError),
+    /// The volume's files would be larger than allowed.
+    #[error(
+        "a volume of {} x {} x {} voxels takes {needs_mb} MB on the disk, above the limit of {limit_mb} MB: take larger \
+         voxels (--voxel-mm), or allow it (--disk-mb)", size[0], size[1], size[2]
+    )]
+    VolumeOnDisk {
+        /// Voxels along x, y, z.
+        size: [usize; 3],
+        /// What its files would take (MB, 10^6 bytes).
+        needs_mb: u64,
+        /// What is allowed (MB).
+        limit_mb: u64,
+    },
     /// The table of what each part of an image counts.
     #[error("{}: no table of importance: {why}", path.display())]
     Importance {

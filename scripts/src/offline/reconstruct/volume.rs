@@ -12,6 +12,8 @@ use super::ReconstructError;
 
 /// Voxel size when nothing says another (mm).
 pub(super) const VOXEL_MM: f64 = 0.5;
+/// The most that a volume's files take on the disk when nothing says another (MB, 10^6 bytes): four whole legs at 0.2 mm.
+const DISK_MB: u64 = 8_000;
 
 /// How a volume is built, where it is said; the configuration's way, or the usual one, where it is not.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -29,6 +31,8 @@ pub struct VolumeOptions {
     /// Memory the volume may take while it is built (MB, 10^6 bytes), the images apart; one that needs more is built
     /// and written in parts.
     pub memory_mb: Option<u64>,
+    /// Room on the disk its two files may take together (MB, 10^6 bytes).
+    pub disk_mb: Option<u64>,
     /// Whether it is written as NRRD; else MHA.
     pub nrrd: bool,
 }
@@ -89,11 +93,21 @@ pub(super) fn build(
 ) -> Result<VolumeMade, ReconstructError> {
     let tiles = Tiles::new(slices, &options.over(usual)?)?;
     let (grid, memory_mb) = (tiles.grid().clone(), tiles.memory_bytes() as f64 / 1e6);
+    fits_the_disk(grid.size, options.disk_mb.unwrap_or(DISK_MB))?;
     let ending = if options.nrrd { "nrrd" } else { "mha" };
     let [file, marks] = ["volume", "volume-marks"].map(|name| out.join(name).with_extension(ending));
     let Written { seen, filled, parts } = tiles.write(&file, &marks, |_| ())?;
     let spacing_mm = grid.spacing_m.map(|s| s * 1e3);
     Ok(VolumeMade { file, marks, size: grid.size, spacing_mm, seen, filled, parts, memory_mb })
+}
+
+/// Grey levels and marks are a byte each for every voxel.
+fn fits_the_disk(size: [usize; 3], limit_mb: u64) -> Result<(), ReconstructError> {
+    let needs_mb = size.iter().fold(2, |bytes: u64, n| bytes.saturating_mul(*n as u64)) / 1_000_000;
+    if needs_mb > limit_mb {
+        return Err(ReconstructError::VolumeOnDisk { size, needs_mb, limit_mb });
+    }
+    Ok(())
 }
 
 impl fmt::Display for VolumeMade {
@@ -147,6 +161,7 @@ mod tests {
             fill_mm: Some(2.0),
             importance: Some(table.clone()),
             memory_mb: None,
+            disk_mb: None,
             nrrd: true,
         };
         let whole = build(&slices, &usual, &options, &folder).unwrap();
