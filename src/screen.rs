@@ -4,10 +4,10 @@ use std::error::Error;
 use std::fmt::Display;
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use indicatif::{ProgressBar, ProgressStyle};
-use probepath_scripts::Progress;
+use probepath_scripts::{Progress, View};
 use serde::Serialize;
 
 /// What a command leaves: the same thing for people and for programs.
@@ -39,13 +39,13 @@ impl Screen {
     pub fn new(json: bool) -> Self {
         let bar =
             if std::io::stderr().is_terminal() { ProgressBar::new(1000) } else { ProgressBar::hidden() };
-        let style = ProgressStyle::with_template("{bar:30} {percent:>3} %  {msg}");
+        let style = ProgressStyle::with_template("{bar:30} {percent:>3} %  {wide_msg}");
         Self { json, bar: bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar())) }
     }
 
     /// What long work tells its progress to.
     pub fn progress(&self) -> Arc<dyn Progress> {
-        Arc::new(Bar(self.bar.clone()))
+        Arc::new(Bar { bar: self.bar.clone(), step: Mutex::default() })
     }
 
     /// Leaves the document of something that goes on.
@@ -100,16 +100,32 @@ impl Screen {
 }
 
 /// A progress bar behind the session's trait.
-struct Bar(ProgressBar);
+struct Bar {
+    bar: ProgressBar,
+    /// What is being done: its words stay until the next step, those of the vessel so far beside them.
+    step: Mutex<String>,
+}
 
 impl Progress for Bar {
     fn at(&self, step: &str, fraction: f64) {
-        self.0.set_message(step.to_owned());
-        self.0.set_position((fraction.clamp(0.0, 1.0) * 1000.0) as u64);
+        let mut shown = self.step.lock().unwrap_or_else(PoisonError::into_inner);
+        if *shown != step {
+            step.clone_into(&mut shown);
+            self.bar.set_message(step.to_owned());
+        }
+        self.bar.set_position((fraction.clamp(0.0, 1.0) * 1000.0) as u64);
+    }
+
+    fn watches_vessel(&self) -> bool {
+        !self.bar.is_hidden()
+    }
+
+    fn vessel(&self, so_far: &View) {
+        self.bar.set_message(format!("scanning: {so_far}"));
     }
 
     fn say(&self, text: &str) {
-        self.0.suspend(|| {
+        self.bar.suspend(|| {
             let _ = writeln!(std::io::stderr().lock(), "{text}");
         });
     }

@@ -15,9 +15,10 @@ use std::sync::{Arc, Mutex};
 
 use probepath_robot::Operator;
 use probepath_scripts::protocol::{self, Protocol};
+use probepath_scripts::report::Report;
 use probepath_scripts::session::{CellFile, Opening, Session, protocol_of};
 use probepath_scripts::validate::shares;
-use probepath_scripts::{Progress, ScanRequest, offline};
+use probepath_scripts::{Progress, ScanRequest, View, offline};
 use probepath_us_capture::exam::{Ending, Exam};
 
 /// Teaches the usual way, but scans only the first part of it, past the bifurcation: a minute of leg is for `validate`.
@@ -60,7 +61,7 @@ fn one_scan_leaves_report_surface_and_an_exam_that_keeps_every_promise() {
     assert_eq!(exam.bscans.len(), report.images.kept);
     strangers_read_the_surfaces(&out);
     within_limits(&exam, &out);
-    the_same_again(&out);
+    the_same_again_while_somebody_watches(&out, &report);
     played_back(&exam, &out);
     reconstructed_again(&out, &report);
     fs::remove_dir_all(out).unwrap();
@@ -88,13 +89,50 @@ fn within_limits(exam: &Exam, out: &Path) {
     assert!(shares.jerk > 0.05, "an exam in which nothing moves: {shares:?}");
 }
 
-/// The same seed gives the same exam file, byte for byte.
-fn the_same_again(out: &Path) {
+/// Keeps the last view of the vessel, and what was said.
+#[derive(Default)]
+struct Watching {
+    view: Mutex<Option<View>>,
+    said: Mutex<String>,
+}
+
+impl Progress for Watching {
+    fn at(&self, _: &str, _: f64) {}
+
+    fn say(&self, text: &str) {
+        self.said.lock().unwrap().push_str(text);
+    }
+
+    fn watches_vessel(&self) -> bool {
+        true
+    }
+
+    fn vessel(&self, so_far: &View) {
+        *self.view.lock().unwrap() = Some(so_far.clone());
+    }
+}
+
+/// The same seed gives the same exam file, byte for byte, also where somebody watches the vessel grow; and what is
+/// watched is the vessel of the report.
+fn the_same_again_while_somebody_watches(out: &Path, report: &Report) {
     let again = folder("again");
-    request(&again, SHORT).run(&Operator::new(), Arc::new(())).unwrap();
+    let watching = Arc::new(Watching::default());
+    request(&again, SHORT).run(&Operator::new(), watching.clone()).unwrap();
     let [one, other] = [out, &again].map(|folder| fs::read(folder.join("exam.mcap")).unwrap());
     assert!(one == other, "{} and {} bytes", one.len(), other.len());
     fs::remove_dir_all(again).unwrap();
+    let said = watching.said.lock().unwrap();
+    assert!(said.contains("The vessel was shown"), "{said}");
+    let view = watching.view.lock().unwrap().clone().unwrap();
+    let vessel = view.vessel.unwrap();
+    let (seen, whole) = (vessel.narrowest().unwrap().area_mm2, least_area(report));
+    assert!((seen / whole - 1.0).abs() < 0.1, "{seen} {whole}");
+    assert!(vessel.covered_percent > 90.0, "{}", vessel.covered_percent);
+}
+
+/// The narrowest measured section of a report (mm2).
+fn least_area(report: &Report) -> f64 {
+    report.area_curve.iter().filter_map(|at| at.area_mm2).fold(f64::INFINITY, f64::min)
 }
 
 /// A recorded exam given back through the recorded arm gives the same commands: one that differed would end the
@@ -134,7 +172,7 @@ fn clone_of(exam: &Exam) -> Exam {
 }
 
 /// `reconstruct` of the exam finds the same stenoses and areas.
-fn reconstructed_again(out: &Path, report: &probepath_scripts::report::Report) {
+fn reconstructed_again(out: &Path, report: &Report) {
     let again = out.join("again");
     let wish = offline::ReconstructWish { input: out.join("exam.mcap"), out: again, ..Default::default() };
     let made = offline::reconstruct(&wish, &()).unwrap();

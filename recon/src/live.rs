@@ -1,6 +1,7 @@
 //! The lumen while the probe is still moving: what is seen so far, and where it has to look again.
 
 use std::collections::HashMap;
+use std::fmt;
 
 use probepath_frames::Stamp;
 use probepath_us_capture::PlacedBScan;
@@ -53,6 +54,28 @@ pub struct View {
     pub speed_mm_s: Option<f64>,
     /// Whether the last images are so far apart (1.5 mm) that a short stenosis would be blurred.
     pub too_fast: bool,
+}
+
+impl fmt::Display for View {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ImageCounts { images, without_lumen, .. } = self.counts;
+        write!(f, "lumen in {} of {images} images", images - without_lumen)?;
+        if let Ok(vessel) = &self.vessel {
+            let (length, covered) = (vessel.centreline.length_m() * 1e3, vessel.covered_percent);
+            write!(f, ", {length:.0} mm of vessel ({covered:.0} % seen)")?;
+            if let Some(AreaSoFar { at_mm, area_mm2, .. }) = vessel.narrowest() {
+                write!(f, ", narrowest {area_mm2:.1} mm² at {at_mm:.0} mm")?;
+            }
+        }
+        if self.too_fast { write!(f, ", too fast for a short stenosis") } else { Ok(()) }
+    }
+}
+
+impl VesselSoFar {
+    /// Where it is narrowest.
+    pub fn narrowest(&self) -> Option<&AreaSoFar> {
+        self.areas.iter().min_by(|a, b| a.area_mm2.total_cmp(&b.area_mm2))
+    }
 }
 
 /// Surface, coverage and areas so far.

@@ -27,6 +27,7 @@ mod request;
 pub mod session;
 pub mod validate;
 
+pub use probepath_recon::View;
 pub use probepath_robot::Operator;
 pub use progress::Progress;
 pub use request::{ScanError, ScanRequest};

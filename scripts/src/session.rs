@@ -10,6 +10,7 @@ mod calibrate;
 mod cell;
 mod error;
 mod figures;
+mod live;
 mod locate;
 mod measure;
 mod motion;

@@ -12,6 +12,7 @@ use probepath_us_capture::exam::{ExamWriter, Row, TickRecord};
 use probepath_us_capture::{BScanSource, Capture, CaptureError, PlacedBScan};
 
 use super::figures::Figures;
+use super::live::Live;
 use super::motion::Watcher;
 use crate::progress::Progress;
 
@@ -110,6 +111,8 @@ pub(super) struct Eye<'a> {
     pub(super) looked: Option<Stamp>,
     /// No machine is later with a B-scan.
     pub(super) latest: Span,
+    /// Where somebody watches the vessel grow.
+    pub(super) live: Option<&'a mut Live>,
 }
 
 /// No machine is later with a B-scan.
@@ -197,6 +200,9 @@ impl Eye<'_> {
         self.capture.poll(self.machine, now)?;
         while let Some(placed) = self.capture.take() {
             exam.bscan(placed.clone());
+            if let Some(live) = &mut self.live {
+                live.see(&placed);
+            }
             self.images.push(placed);
         }
         Ok(())

@@ -16,6 +16,7 @@ use probepath_teach_replay::{LiftOff, Path, ReplayError, ReplayPhase, ReplayStat
 use probepath_us_capture::{Capture, PlacedBScan};
 
 use super::figures::Figures;
+use super::live::Live;
 use super::motion::Motion;
 use super::recorder::Stand;
 use super::scan::{Scan, ScanWish};
@@ -41,6 +42,8 @@ pub(super) struct Underway {
     pub(super) capture: Option<Capture>,
     pub(super) figures: Figures,
     pub(super) images: Vec<PlacedBScan>,
+    /// The vessel so far, where somebody watches.
+    pub(super) live: Option<Live>,
     /// How far along the path the skin was followed (m).
     pub(super) at_m: f64,
     /// Whether the probe may be on the skin.
@@ -50,7 +53,7 @@ pub(super) struct Underway {
 impl Underway {
     /// Nothing was followed yet.
     pub(super) const fn new(path: Path, wish: ScanWish, capture: Option<Capture>, figures: Figures) -> Self {
-        Self { path, wish, capture, figures, images: Vec::new(), at_m: 0.0, touches: false }
+        Self { path, wish, capture, figures, images: Vec::new(), live: None, at_m: 0.0, touches: false }
     }
 
     /// How far a replay of its rest went, which began `begins_at` metres along the path.

@@ -1,5 +1,7 @@
 //! Scanning: the taught path replayed at constant force, a B-scan kept at every step along it.
 
+use std::sync::Arc;
+
 use probepath_frames::Stamp;
 use probepath_recon::{ErrorBudget, LumenReconstruction, LumenSettings, SeedPoint, reconstruct_lumen};
 use probepath_robot::motion::timing::PathSpeed;
@@ -11,6 +13,7 @@ use probepath_us_capture::exam::Attachment;
 use probepath_us_capture::{Calibration, Capture, Counts, Keeping, PlacedBScan};
 
 use super::figures::Figures;
+use super::live::Live;
 use super::motion::Motion;
 use super::recorder::{Eye, LATEST, Recorder, Stand};
 use super::resume::Underway;
@@ -114,7 +117,8 @@ impl Session {
         let capture = wish.look.then(|| self.capture(keeping)).transpose()?;
         let figures = Figures::new(path.curve().clone(), wish.force_n);
         self.stopped = None;
-        let underway = Underway::new(path.clone(), *wish, capture, figures);
+        let mut underway = Underway::new(path.clone(), *wish, capture, figures);
+        underway.live = self.live(wish)?;
         let replay = self.replay_of(plan, wish)?;
         self.go_along(underway, replay)
     }
@@ -139,7 +143,8 @@ impl Session {
 
     /// What a scan brought.
     pub(super) fn finished(&mut self, underway: Underway) -> Result<Scan, SessionError> {
-        let Underway { path, wish, mut capture, figures, mut images, .. } = underway;
+        let Underway { path, wish, mut capture, figures, mut images, live, .. } = underway;
+        let shown = live.map(Live::finish);
         if let Some(capture) = &mut capture {
             capture.finish();
             self.keep_rest(capture, &mut images);
@@ -150,7 +155,21 @@ impl Session {
         let scan = Scan { images, counts, figures: figures_of_scan, wish, label, followed };
         let (kept, force) = (scan.images.len(), &scan.figures.force_n);
         self.say(&format!("Scanned: {kept} B-scans kept, the force {:.2} N RMS off.", force.rms_error));
+        if let Some(shown) = shown {
+            // Not in the exam: a simulated one holds nothing of the wall's clock.
+            self.opening.progress.say(&shown.to_string());
+        }
         Ok(scan)
+    }
+
+    /// The vessel while it is scanned, where somebody watches it.
+    fn live(&self, wish: &ScanWish) -> Result<Option<Live>, SessionError> {
+        let progress = &self.opening.progress;
+        if !(wish.look && progress.watches_vessel()) {
+            return Ok(None);
+        }
+        let settings = lumen_settings(self.cell.calibration.as_ref());
+        Ok(Some(Live::start(settings, Arc::clone(progress))?))
     }
 
     /// What takes B-scans, where there is a machine.
@@ -213,7 +232,7 @@ impl Session {
         let operator: Operator = self.opening.operator.clone();
         let (watch, begins_at, whole) = (replay.watch(), underway.at_m, underway.path.length());
         let stand = || stand_of(&watch.status(), begins_at, whole);
-        let Underway { capture, images, figures, .. } = underway;
+        let Underway { capture, images, figures, live, .. } = underway;
         let exam = self.exam.as_ref().ok_or(SessionError::Order("the exam was not begun"))?;
         let facts = &self.cell.facts;
         let arm = &mut *self.cell.arm;
@@ -231,6 +250,7 @@ impl Session {
                 paused,
                 looked,
                 latest,
+                live: live.as_mut(),
             }),
         };
         let mut recorder = Recorder {

@@ -223,6 +223,7 @@ impl Session {
             paused: false,
             looked: None,
             latest: Span::from_nanoseconds(latency.nanoseconds() + LATE.nanoseconds()),
+            live: None,
         };
         let mut recorder = Recorder {
             exam,
