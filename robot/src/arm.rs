@@ -196,6 +196,12 @@ pub trait Arm {
     /// When no next state came, or the command was refused; the arm then brakes by its own means.
     fn exchange(&mut self, command: &Command) -> Result<State, ArmFault>;
 
+    /// The states that came together with the one that the last exchange gave, and are older; oldest first. This
+    /// computer was late: nothing was commanded upon them, but whoever records or looks at B-scans wants them all.
+    fn overtaken(&self) -> &[State] {
+        &[]
+    }
+
     /// The time between two ticks.
     fn period(&self) -> Span;
 

@@ -4,8 +4,23 @@ use probepath_frames::Span;
 
 use crate::{Arm, ArmFault, Command, State};
 
-/// One tick of a recording: the command that went out, and the state that came back.
-pub type Row = (Command, State);
+/// One tick of a recording.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    /// The command that went out.
+    pub command: Command,
+    /// The state that came back.
+    pub state: State,
+    /// Whether a newer state came with it ([`Arm::overtaken`]): the next row is of the same exchange.
+    pub overtaken: bool,
+}
+
+impl From<(Command, State)> for Row {
+    /// A row of an exchange that brought one state.
+    fn from((command, state): (Command, State)) -> Self {
+        Self { command, state, overtaken: false }
+    }
+}
 
 /// Plays a recording back: the same software, protocol and exam give the same commands, to the bit.
 #[derive(Clone, Debug)]
@@ -14,21 +29,32 @@ pub struct RecordedArm<R> {
     period: Span,
     joints: usize,
     tick: u64,
+    overtaken: Vec<State>,
 }
 
 impl<R: Iterator<Item = Row>> RecordedArm<R> {
     /// An arm of `joints` joints that reads its rows as it is asked.
-    pub const fn new(rows: R, period: Span, joints: usize) -> Self {
-        Self { rows, period, joints, tick: 0 }
+    pub fn new(rows: R, period: Span, joints: usize) -> Self {
+        Self { rows, period, joints, tick: 0, overtaken: Vec::new() }
     }
 }
 
 impl<R: Iterator<Item = Row>> Arm for RecordedArm<R> {
     fn exchange(&mut self, command: &Command) -> Result<State, ArmFault> {
-        let (recorded, state) = self.rows.next().ok_or(ArmFault::RecordingEnds { tick: self.tick })?;
-        compare(&recorded, command, state.tick)?;
-        self.tick = state.tick;
-        Ok(state)
+        self.overtaken.clear();
+        loop {
+            let row = self.rows.next().ok_or(ArmFault::RecordingEnds { tick: self.tick })?;
+            compare(&row.command, command, row.state.tick)?;
+            self.tick = row.state.tick;
+            if !row.overtaken {
+                return Ok(row.state);
+            }
+            self.overtaken.push(row.state);
+        }
+    }
+
+    fn overtaken(&self) -> &[State] {
+        &self.overtaken
     }
 
     fn period(&self) -> Span {

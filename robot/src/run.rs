@@ -269,14 +269,28 @@ impl<'a> Motion<'a> {
         self.state = self.arm.exchange(&command).map_err(StopReason::Arm)?;
         let free = self.free;
         let verdict = if braking { Verdict::Fine } else { self.guard.judge(&self.state, self.dt, free) };
-        let tick = Tick { index: self.ticks, wanted, command, changed, state: self.state, verdict, braking };
+        let state = self.state;
+        let tick =
+            Tick { index: self.ticks, wanted, command, changed, state, verdict, braking, overtaken: false };
         self.ticks += 1;
         self.guard.remember(&tick);
-        let wish = self.tell(&tick)?;
+        let late = self.tell_overtaken(&tick)?;
+        let wish = late.or(self.tell(&tick)?);
         match verdict {
             Verdict::Stop(trip) => Err(StopReason::Guard(trip)),
             _ => Ok(wish),
         }
+    }
+
+    /// Tells of the states that came together with a tick's, older ones first.
+    fn tell_overtaken(&mut self, tick: &Tick) -> Result<Wish, StopReason> {
+        let mut wish = Wish::GoOn;
+        for older in 0..self.arm.overtaken().len() {
+            if let Some(tick) = tick.older(&*self.arm, older) {
+                wish = wish.or(self.tell(&tick)?);
+            }
+        }
+        Ok(wish)
     }
 
     fn tell(&mut self, tick: &Tick) -> Result<Wish, StopReason> {
@@ -360,8 +374,10 @@ fn rest(arm: &mut dyn Arm, observer: &mut dyn Observer) -> Result<Rested, StopRe
     for index in 0..TICKS_TO_REST {
         let state = arm.exchange(&Command::Stay).map_err(StopReason::Arm)?;
         let tick = Tick::staying(index, state);
-        if let stop @ Wish::Stop(_) = caught("observer", || observer.tick(&tick))? {
-            asked = stop;
+        // What waited while nobody asked belongs to no motion.
+        let older = if index == 0 { 0 } else { arm.overtaken().len() };
+        for tick in (0..older).filter_map(|older| tick.older(arm, older)).chain([tick]) {
+            asked = asked.or(caught("observer", || observer.tick(&tick))?);
         }
         same = if before == Some(state.commanded) { same + 1 } else { 0 };
         before = Some(state.commanded);

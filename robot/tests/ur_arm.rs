@@ -114,6 +114,30 @@ fn skipped_packages_show_as_gaps_and_are_counted() {
 }
 
 /// What a fault at package 10 is, and when it is seen.
+#[test]
+fn packages_that_come_together_are_all_seen_and_the_newest_is_commanded_upon() {
+    let (_controller, mut arm) = connected(Lies { burst: 50..51, ..Lies::default() });
+    let first = arm.exchange(&Command::Stay).unwrap();
+    let (mut last, mut together, mut commanded) = (first, 0, first.commanded);
+    for n in 1..=100 {
+        let state = arm.exchange(&near(&first.commanded, 1e-4 * f64::from(n))).unwrap();
+        let older = arm.overtaken();
+        assert_eq!(state.tick, last.tick + 1 + older.len() as u64, "none is missing");
+        for (k, overtaken) in older.iter().enumerate() {
+            assert_eq!(overtaken.tick, last.tick + 1 + k as u64);
+            let behind = state.stamp - overtaken.stamp;
+            assert_eq!(overtaken.stamp, last.stamp + Span::from_milliseconds(2 * (1 + k as i64)));
+            assert_eq!((overtaken.age.nanoseconds() - state.age.nanoseconds()), behind.nanoseconds());
+            assert_eq!(overtaken.commanded, commanded, "this exchange's command was not heard yet");
+        }
+        together += older.len();
+        (last, commanded) = (state, state.commanded);
+    }
+    assert_eq!(together, 3);
+    let counts = arm.counts();
+    assert_eq!((counts.late, counts.gaps), (3, 0));
+}
+
 fn fault(lies: Lies) -> (Controller, UrArm, ArmFault, u32) {
     let (controller, mut arm) = connected(lies);
     let here = arm.exchange(&Command::Stay).unwrap().commanded;

@@ -18,9 +18,10 @@ static ALLOCATOR: AllocDisabler = AllocDisabler;
 
 #[test]
 fn no_exchange_touches_the_heap() {
-    let controller = Controller::start(Lies { skip: 300..304, ..Lies::default() });
+    let controller = Controller::start(Lies { skip: 300..304, burst: 100..120, ..Lies::default() });
     let mut arm = UrArm::connect(&controller.host, settings()).unwrap();
     let here = arm.exchange(&Command::Stay).unwrap().commanded;
+    let mut together = 0;
     let last = assert_no_alloc(|| {
         let mut last = None;
         for n in 0..600_u32 {
@@ -30,9 +31,11 @@ fn no_exchange_touches_the_heap() {
                 _ => Command::Freedrive,
             };
             last = Some(arm.exchange(&command));
+            together += arm.overtaken().len();
         }
         last
     });
     assert!(last.unwrap().is_ok());
+    assert_eq!(together, 60);
     assert!(arm.counts().packages > 500 && arm.counts().gaps == 4);
 }

@@ -53,6 +53,7 @@ fn tick(n: u64, noise: &mut Noise) -> Result<TickRecord, Box<dyn Error>> {
         guiding: false,
         phase: "replay".into(),
         safety: "".into(),
+        overtaken: false,
         freedrive: false,
         age: Span::ZERO,
         // FRAMES: made up, as large as a real one.

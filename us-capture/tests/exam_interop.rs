@@ -39,6 +39,7 @@ fn tick(n: u64) -> TickRecord {
         guiding: n < 500,
         phase: "teach".into(),
         safety: "reduced".into(),
+        overtaken: false,
         freedrive: false,
         age: Span::from_nanoseconds(7),
         world_from_probe: Some(pose(n)),

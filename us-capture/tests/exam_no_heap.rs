@@ -22,6 +22,7 @@ fn tick(n: i64) -> TickRecord {
         guiding: false,
         phase: "replay".into(),
         safety: "".into(),
+        overtaken: false,
         freedrive: false,
         age: Span::ZERO,
         // FRAMES: made up for the test.

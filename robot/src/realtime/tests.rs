@@ -11,10 +11,12 @@ use crate::*;
 
 const PERIOD: Span = Span::from_milliseconds(2);
 
-/// Does what it is told at once; skips a tick now and then.
+/// Does what it is told at once; skips a tick now and then, or says two at once.
 struct Ideal {
     state: State,
     skips: Vec<u64>,
+    bursts: Vec<u64>,
+    older: Vec<State>,
 }
 
 fn ideal() -> Ideal {
@@ -30,7 +32,7 @@ fn ideal() -> Ideal {
         safety: Default::default(),
         age: Span::ZERO,
     };
-    Ideal { state, skips: Vec::new() }
+    Ideal { state, skips: Vec::new(), bursts: Vec::new(), older: Vec::new() }
 }
 
 impl Arm for Ideal {
@@ -38,12 +40,22 @@ impl Arm for Ideal {
         if let Command::Position(q) = command {
             (self.state.position, self.state.commanded) = (*q, *q);
         }
+        self.older.clear();
+        if self.bursts.contains(&self.state.tick) {
+            self.state.tick += 1;
+            self.state.stamp = self.state.stamp + PERIOD;
+            self.older.push(self.state);
+        }
         let ticks = 1 + u64::from(self.skips.contains(&self.state.tick));
         self.state.tick += ticks;
         for _ in 0..ticks {
             self.state.stamp = self.state.stamp + PERIOD;
         }
         Ok(self.state)
+    }
+
+    fn overtaken(&self) -> &[State] {
+        &self.older
     }
 
     fn period(&self) -> Span {
@@ -156,6 +168,32 @@ fn what_finds_no_room_on_the_tape_is_counted() {
     assert!(!reader.has_ended());
     drop(writer);
     assert!(reader.has_ended());
+}
+
+#[test]
+fn what_comes_together_is_watched_in_order_and_plays_back() {
+    let bursts = vec![40, 41, 90];
+    let (mut rows, mut timings) = (Vec::new(), Timings::default());
+    let mut watch = |tick: &Tick, (): ()| {
+        rows.push(Row { command: tick.command, state: tick.state, overtaken: tick.overtaken });
+        Wish::GoOn
+    };
+    let mut arm = Ideal { bursts, ..ideal() };
+    let road = run_apart(&mut arm, &mut there(), &mut guard(), &mut timings, || (), &mut watch);
+    let live = road.done.unwrap();
+    // The tick of 41 was overtaken itself.
+    assert_eq!((timings.overtaken, timings.skipped, road.lost), (2, 0, 0));
+    assert_eq!(timings.lateness.count(), timings.ticks + timings.overtaken - 1);
+    assert!(rows.windows(2).all(|pair| pair[1].state.tick == pair[0].state.tick + 1), "none is missing");
+    assert_eq!(rows.iter().filter(|row| row.overtaken).count(), 2);
+    let mut again = Vec::new();
+    let mut watch = |tick: &Tick| {
+        again.push(tick.state);
+        Wish::GoOn
+    };
+    let mut recorded = RecordedArm::new(rows.iter().copied(), PERIOD, 6);
+    assert_eq!(run(&mut recorded, &mut there(), &mut guard(), &mut watch).unwrap(), live);
+    assert_eq!(again, rows.iter().map(|row| row.state).collect::<Vec<_>>());
 }
 
 /// Instants one after another, as a test says.

@@ -50,8 +50,11 @@ pub struct Timings {
     pub round_trip: Histogram,
     /// How many states came.
     pub ticks: u64,
-    /// How many ticks were skipped, by the arm's own count.
+    /// How many ticks were skipped, by the arm's own count: no state of theirs came.
     pub skipped: u64,
+    /// How many states came together with a newer one, because this computer was late: seen, and nothing commanded upon
+    /// them. They are in `lateness`, and not in `ticks`.
+    pub overtaken: u64,
 }
 
 impl Timings {
@@ -62,6 +65,7 @@ impl Timings {
         self.round_trip.merge(&other.round_trip);
         self.ticks += other.ticks;
         self.skipped += other.skipped;
+        self.overtaken += other.overtaken;
     }
 
     /// Its figures, for a file or a screen.
@@ -69,6 +73,7 @@ impl Timings {
         TimingFigures {
             ticks: self.ticks,
             skipped: self.skipped,
+            overtaken: self.overtaken,
             lateness: self.lateness.figures(),
             step: self.step.figures(),
             round_trip: self.round_trip.figures(),
@@ -81,8 +86,10 @@ impl Timings {
 pub struct TimingFigures {
     /// How many states came.
     pub ticks: u64,
-    /// How many ticks were skipped, by the arm's own count.
+    /// How many ticks were skipped, by the arm's own count: no state of theirs came.
     pub skipped: u64,
+    /// How many states came together with a newer one, because this computer was late.
+    pub overtaken: u64,
     /// How late a state arrived beyond the smallest delay.
     pub lateness: Option<Figures>,
     /// From a state's arrival until the next command goes out.
@@ -100,7 +107,11 @@ impl fmt::Display for TimingFigures {
         line(f, "tick lateness", self.lateness)?;
         line(f, "step", self.step)?;
         line(f, "round trip", self.round_trip)?;
-        write!(f, "{} ticks, {} skipped by the arm's count", self.ticks, self.skipped)
+        let Self { ticks, skipped, overtaken, .. } = self;
+        write!(
+            f,
+            "{ticks} ticks, {skipped} skipped by the arm's count, {overtaken} came together with a newer one"
+        )
     }
 }
 
@@ -130,11 +141,19 @@ impl<'a, A: Arm + ?Sized, C: Clock> Timed<'a, A, C> {
             self.timings.step.record(sent - before);
         }
         self.timings.round_trip.record(here - sent);
-        // The clock of the first state starts the pace: there is nothing yet to be late against.
-        let late = self.pace.hear(state.stamp, here);
+        // The clock of the first state starts the pace: there is nothing yet to be late against. What came with it
+        // waited while nobody asked.
         if let Some(before) = self.tick {
-            self.timings.lateness.record(late);
-            self.timings.skipped += state.tick.saturating_sub(before).saturating_sub(1);
+            let older = self.arm.overtaken();
+            for overtaken in older {
+                self.timings.lateness.record(self.pace.hear(overtaken.stamp, here));
+            }
+            self.timings.lateness.record(self.pace.hear(state.stamp, here));
+            let came = older.len() as u64 + 1;
+            self.timings.overtaken += came - 1;
+            self.timings.skipped += state.tick.saturating_sub(before).saturating_sub(came);
+        } else {
+            self.pace.hear(state.stamp, here);
         }
         self.timings.ticks += 1;
         (self.here, self.tick) = (Some(here), Some(state.tick));
@@ -148,6 +167,10 @@ impl<A: Arm + ?Sized, C: Clock> Arm for Timed<'_, A, C> {
         let here = self.clock.now();
         self.count(sent, here, &state);
         Ok(state)
+    }
+
+    fn overtaken(&self) -> &[State] {
+        self.arm.overtaken()
     }
 
     fn period(&self) -> Span {

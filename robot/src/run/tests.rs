@@ -263,12 +263,12 @@ fn the_observer_sees_every_exchange() {
 fn a_record_replays_to_itself_and_another_motion_diverges() {
     let mut arm = TestArm::new(Fails::default());
     run(&mut arm, &mut there(), &mut guard(), &mut ()).unwrap();
-    let mut recorded = RecordedArm::new(arm.rows.iter().copied(), PERIOD, 2);
+    let mut recorded = RecordedArm::new(arm.rows.iter().copied().map(crate::Row::from), PERIOD, 2);
     run(&mut recorded, &mut there(), &mut guard(), &mut ()).unwrap();
     assert!(matches!(recorded.exchange(&Command::Stay), Err(ArmFault::RecordingEnds { .. })));
     let elsewhere = Joints::from_slice(&[1.0, -0.4000001]).unwrap();
     let mut other = PointToPoint::plan(&Joints::zeros(2), &elsewhere, &limits(), PERIOD).unwrap();
-    let mut recorded = RecordedArm::new(arm.rows.iter().copied(), PERIOD, 2);
+    let mut recorded = RecordedArm::new(arm.rows.iter().copied().map(crate::Row::from), PERIOD, 2);
     let error = run(&mut recorded, &mut other, &mut guard(), &mut ()).unwrap_err();
     assert!(matches!(error.reason, StopReason::Arm(ArmFault::Diverged { joint: 1, .. })));
 }

@@ -54,6 +54,8 @@ pub struct Lies {
     pub stall_at: Option<u64>,
     /// These packages are not sent, and the clock goes on.
     pub skip: std::ops::Range<u64>,
+    /// At these packages three more came late, and come together with them.
+    pub burst: std::ops::Range<u64>,
     /// From this package on, no echo.
     pub deaf_at: Option<u64>,
     /// At this package the clock goes back.
@@ -89,6 +91,7 @@ impl Default for Lies {
             cut_at: None,
             stall_at: None,
             skip: 0..0,
+            burst: 0..0,
             deaf_at: None,
             back_at: None,
             nan_at: None,
@@ -392,6 +395,14 @@ fn package(
         inside.tick += lies.skip.end - lies.skip.start;
         inside.packages += lies.skip.end - lies.skip.start;
     }
+    let mut bytes = Vec::new();
+    if lies.burst.contains(&n) {
+        // What comes late comes together.
+        for _ in 0..3 {
+            put(&mut bytes, session, n, inside, lies);
+            inside.tick += 1;
+        }
+    }
     let is = |at: Option<u64>| served && inside.scripts < 2 && at == Some(n);
     if is(lies.stall_at) {
         std::thread::sleep(Duration::from_millis(2500));
@@ -407,7 +418,6 @@ fn package(
     if is(lies.short_at) {
         fields.pop();
     }
-    let mut bytes = Vec::new();
     Reply::Data { recipe: 1, fields: &fields }.write(Version::V2, &mut bytes).unwrap();
     if is(lies.cut_at) {
         stream.write_all(&bytes[..bytes.len() / 2])?;
@@ -415,6 +425,14 @@ fn package(
     }
     stream.write_all(&bytes)?;
     Ok(true)
+}
+
+fn put(bytes: &mut Vec<u8>, session: &Session, n: u64, inside: &Inside, lies: &Lies) {
+    let mut fields = Vec::new();
+    for name in &session.outputs {
+        value(name, n, inside, lies).write(&mut fields);
+    }
+    Reply::Data { recipe: 1, fields: &fields }.write(Version::V2, bytes).unwrap();
 }
 
 fn value(name: &str, n: u64, inside: &Inside, lies: &Lies) -> Value {

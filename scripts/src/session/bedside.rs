@@ -56,6 +56,10 @@ impl Arm for SimulatedBedside {
         self.arm.exchange(command)
     }
 
+    fn overtaken(&self) -> &[State] {
+        self.arm.overtaken()
+    }
+
     fn period(&self) -> Span {
         self.arm.period()
     }

@@ -5,7 +5,7 @@ use probepath_robot::{
     Arm, BlackBox, Command, Controller, Ending, Finished, Guard, Observer, RunError, State, StopReason, Tick,
     Wish, run,
 };
-use probepath_us_capture::exam::ExamWriter;
+use probepath_us_capture::exam::{ExamWriter, TickRecord};
 use serde::Serialize;
 
 use super::SessionError;
@@ -127,7 +127,8 @@ fn apart(
     let mut unmeasured = Punctual::default();
     let punctual = punctual.unwrap_or(&mut unmeasured);
     let mut watch = |tick: &Tick, stand: Stand| {
-        exam.tick(record(&tick.command, &tick.state, &stand, facts));
+        let record = record(&tick.command, &tick.state, &stand, facts);
+        exam.tick(TickRecord { overtaken: tick.overtaken, ..record });
         watcher.see(tick, &stand)
     };
     let gone = run_apart(arm, controller, guard, &mut punctual.timings, stand, &mut watch);

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use probepath_frames::Stamp;
-use probepath_robot::{Command, Joints, RecordedArm, Safety, State};
+use probepath_robot::{Command, Joints, RecordedArm, Row, Safety, State};
 use probepath_us_capture::exam::{Attachment, Exam, TickRecord};
 use probepath_us_capture::{BScan, BScanSource, Calibration, SourceFault};
 
@@ -57,7 +57,7 @@ pub fn protocol_of(exam: &Exam) -> Result<Protocol, SessionError> {
 }
 
 /// One exchange as the arm's trait speaks of it.
-pub(crate) fn row(record: &TickRecord) -> Result<(Command, State), SessionError> {
+pub(crate) fn row(record: &TickRecord) -> Result<Row, SessionError> {
     let joints = |values: &[f64]| {
         Joints::from_slice(values)
             .map_err(|_| SessionError::Order("the exam has more joints than any arm here"))
@@ -83,7 +83,7 @@ pub(crate) fn row(record: &TickRecord) -> Result<(Command, State), SessionError>
         safety,
         age: record.age,
     };
-    Ok((command, state))
+    Ok(Row { command, state, overtaken: record.overtaken })
 }
 
 /// The B-scans that an exam kept, arriving when they arrived.

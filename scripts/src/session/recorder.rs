@@ -56,8 +56,16 @@ pub(super) struct Taped<'a> {
 impl Arm for Taped<'_> {
     fn exchange(&mut self, command: &Command) -> Result<State, ArmFault> {
         let state = self.arm.exchange(command)?;
+        for older in self.arm.overtaken() {
+            let overtaken = record(command, older, &(self.stand)(), self.facts);
+            self.exam.tick(TickRecord { overtaken: true, ..overtaken });
+        }
         self.exam.tick(record(command, &state, &(self.stand)(), self.facts));
         Ok(state)
+    }
+
+    fn overtaken(&self) -> &[State] {
+        self.arm.overtaken()
     }
 
     fn period(&self) -> Span {
@@ -90,6 +98,7 @@ pub(super) fn record(command: &Command, state: &State, stand: &Stand, facts: &Fa
         safety: Cow::Borrowed(if state.safety == Safety::Normal { "" } else { state.safety.name() }),
         freedrive: *command == Command::Freedrive,
         age: state.age,
+        overtaken: false,
     }
 }
 

@@ -18,7 +18,7 @@ use probepath_robot::realtime::{Clock, Figures, Histogram, Monotonic, TimingFigu
 use probepath_sim::CellConfig;
 use probepath_sim::controller::Time;
 use probepath_us_capture::Counts;
-use probepath_us_capture::exam::{Ending, ExamEvent, ExamReader, Level, Written};
+use probepath_us_capture::exam::{Ending, ExamEvent, ExamReader, Level, TickRecord, Written};
 use serde::Deserialize;
 
 use super::bench::{Folder, tell};
@@ -89,6 +89,8 @@ struct Ran {
     kept: usize,
     /// What the process held after the first scan and after the last (bytes).
     memory: Option<(u64, u64)>,
+    /// How long the processors stood still meanwhile because the machine under a virtual one had other work (s).
+    stolen_s: Option<f64>,
 }
 
 fn run(seconds: f64, cell: CellFile, out: &Path, progress: &dyn Progress) -> Result<Ran, SessionError> {
@@ -104,6 +106,7 @@ fn run(seconds: f64, cell: CellFile, out: &Path, progress: &dyn Progress) -> Res
     let path = session.teach(&TeachWish { study: "SOAK".into(), ..TeachWish::default() })?;
     let scan = ScanWish { every_m: Some(KEPT_EVERY_M), ..ScanWish::default() };
     let (began, mut counts, mut kept, mut before) = (session.now(), Vec::new(), 0, None);
+    let stolen = stolen_s();
     while (session.now() - began).seconds() < seconds {
         tell(progress, "soak", (session.now() - began).seconds() as u64, seconds.ceil() as u64);
         let scanned = session.scan(&path, &scan)?;
@@ -112,8 +115,9 @@ fn run(seconds: f64, cell: CellFile, out: &Path, progress: &dyn Progress) -> Res
         before = before.or_else(memory);
     }
     let (seconds, memory) = ((session.now() - began).seconds(), before.zip(memory()));
+    let stolen_s = stolen.zip(stolen_s()).map(|(before, after)| after - before);
     let written = session.close()?.unwrap_or_default();
-    Ok(Ran { exam: session.exam_path(), written, seconds, counts, kept, memory })
+    Ok(Ran { exam: session.exam_path(), written, seconds, counts, kept, memory, stolen_s })
 }
 
 /// A B-scan is kept every 2 mm: ten minutes are then less than a gigabyte. Every one is taken and counted all the same.
@@ -124,6 +128,8 @@ const KEPT_EVERY_M: f64 = 0.002;
 struct Found {
     ticks: u64,
     bscans: u64,
+    /// Ticks that came together with a newer one.
+    overtaken: u64,
     /// Ticks of the arm that are missing between two that are there, while a motion ran.
     missing: u64,
     /// What the recording says went wrong, and what is damaged.
@@ -141,13 +147,14 @@ struct Punctual {
 impl Found {
     fn of(exam: &Path) -> Result<Self, probepath_us_capture::exam::ExamError> {
         let mut reader = ExamReader::open(exam)?;
-        let (mut found, mut last) = (Self::default(), None);
+        let (mut found, mut last) = (Self::default(), None::<Seen>);
         while let Some(event) = reader.next_event()? {
             match event {
                 ExamEvent::Tick(tick) => {
                     found.ticks += 1;
-                    found.missing +=
-                        gap(last.replace((tick.tick, tick.phase.clone())), tick.tick, &tick.phase);
+                    found.overtaken += u64::from(tick.overtaken);
+                    let now = Seen::of(&tick);
+                    found.missing += last.replace(now.clone()).map_or(0, |last| last.gap_to(&now));
                 }
                 ExamEvent::BScan(_) => found.bscans += 1,
                 ExamEvent::Event(event) => found.complaints += u64::from(event.level == Level::Error),
@@ -163,13 +170,25 @@ impl Found {
     }
 }
 
-/// Ticks missing between two of the same phase of a motion; between motions nobody listens to the arm.
-fn gap(last: Option<(u64, std::borrow::Cow<'_, str>)>, tick: u64, phase: &str) -> u64 {
-    match last {
-        Some((before, same)) if same == phase && phase != "plan" => {
-            tick.saturating_sub(before).saturating_sub(1)
-        }
-        _ => 0,
+/// A tick, as far as it tells whether one is missing before it.
+#[derive(Clone)]
+struct Seen {
+    tick: u64,
+    phase: std::borrow::Cow<'static, str>,
+    /// Whether the arm was told to stay.
+    stays: bool,
+}
+
+impl Seen {
+    fn of(record: &TickRecord) -> Self {
+        let stays = record.command.is_none() && !record.freedrive;
+        Self { tick: record.tick, phase: record.phase.clone(), stays }
+    }
+
+    /// Ticks missing until the next one while a motion ran: between motions the arm stays, and nobody listens to it.
+    fn gap_to(&self, next: &Self) -> u64 {
+        let moves = self.phase == next.phase && self.phase != "plan" && !(self.stays && next.stays);
+        if moves { next.tick.saturating_sub(self.tick).saturating_sub(1) } else { 0 }
     }
 }
 
@@ -198,12 +217,20 @@ fn rows(ran: &Ran, found: &Found, served: &offline::Served, bare: Option<&Histog
     if let Some(punctual) = &found.punctual {
         rows.push(none("ticks that nobody watched", punctual.unseen_ticks));
         rows.push(none("ticks skipped, by the arm's count", punctual.figures.skipped));
+        let overtaken = found.overtaken as f64;
+        rows.push(told(
+            "ticks that came together with a newer one, recorded and not commanded upon",
+            overtaken,
+        ));
         rows.extend(timing(&punctual.figures, bare.and_then(Histogram::figures).as_ref()));
     }
     rows.extend(lateness("sent: ticks begun late", served.ticks_begun));
     rows.extend(lateness("sent: packages left late", served.packages_left));
     if let Some((before, after)) = ran.memory {
         rows.push(told("memory grown since the first scan, MB", (after as f64 - before as f64) / 1e6));
+    }
+    if let Some(stolen_s) = ran.stolen_s {
+        rows.push(told("processor time that went to others than this (virtual) machine, s", stolen_s));
     }
     rows
 }
@@ -262,17 +289,28 @@ fn memory() -> Option<u64> {
     line.split_whitespace().next()?.parse::<u64>().ok().map(|kilobytes| kilobytes * 1024)
 }
 
+/// How long the machine under this virtual one gave its processors to others since it began (s), all processors
+/// together, where the system says it: Linux counts in hundredths.
+fn stolen_s() -> Option<f64> {
+    let stat = std::fs::read_to_string("/proc/stat").ok()?;
+    let all = stat.lines().find_map(|line| line.strip_prefix("cpu "))?;
+    // user, nice, system, idle, iowait, irq, softirq, steal
+    all.split_whitespace().nth(7)?.parse::<u64>().ok().map(|hundredths| hundredths as f64 / 100.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn a_gap_counts_within_a_motion_only() {
-        let last = |tick, phase: &'static str| Some((tick, std::borrow::Cow::Borrowed(phase)));
-        assert_eq!(gap(last(7, "follow"), 8, "follow"), 0);
-        assert_eq!(gap(last(7, "follow"), 11, "follow"), 3);
-        assert_eq!(gap(last(7, "lift"), 900, "approach"), 0);
-        assert_eq!(gap(None, 900, "approach"), 0);
+        let seen = |tick, phase: &'static str, stays| Seen { tick, phase: phase.into(), stays };
+        let follows = seen(7, "follow", false);
+        assert_eq!(follows.gap_to(&seen(8, "follow", false)), 0);
+        assert_eq!(follows.gap_to(&seen(11, "follow", false)), 3);
+        assert_eq!(follows.gap_to(&seen(11, "follow", true)), 3, "on the way to rest");
+        assert_eq!(seen(7, "lift", true).gap_to(&seen(900, "approach", true)), 0);
+        assert_eq!(seen(7, "teach", true).gap_to(&seen(20, "teach", true)), 0, "it has not begun to move");
     }
 
     #[test]

@@ -37,6 +37,7 @@ pub(crate) fn tick(data: &[u8]) -> Result<TickRecord, ExamError> {
         safety: Cow::Owned(message.safety.clone()),
         freedrive: message.freedrive,
         age: Span::from_nanoseconds(message.age_ns),
+        overtaken: message.overtaken,
     })
 }
 

@@ -136,6 +136,7 @@ pub(crate) fn tick(record: &TickRecord) -> proto::Tick {
         safety: record.safety.clone().into_owned(),
         freedrive: record.freedrive,
         age_ns: record.age.nanoseconds(),
+        overtaken: record.overtaken,
     }
 }
 

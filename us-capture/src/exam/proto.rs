@@ -77,6 +77,8 @@ pub(crate) struct Tick {
     pub(crate) freedrive: bool,
     #[prost(sfixed64, tag = "14")]
     pub(crate) age_ns: i64,
+    #[prost(bool, tag = "15")]
+    pub(crate) overtaken: bool,
 }
 
 /// `probepath.BScan`.

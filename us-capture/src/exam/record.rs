@@ -68,6 +68,8 @@ pub struct TickRecord {
     pub freedrive: bool,
     /// How old the measurement was, by the host's clock, when it was used; zero in simulation.
     pub age: Span,
+    /// Whether a newer state came together with this one: it was seen, and nothing was commanded upon it.
+    pub overtaken: bool,
 }
 
 /// How grave an [`Event`] is.

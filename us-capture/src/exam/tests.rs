@@ -67,6 +67,7 @@ pub(crate) fn tick(n: u64, noise: &mut Noise) -> TickRecord {
         world_from_probe: (!n.is_multiple_of(11)).then(|| noise.pose()),
         safety: Cow::Borrowed(if n.is_multiple_of(13) { "reduced" } else { "" }),
         freedrive: n.is_multiple_of(28),
+        overtaken: n.is_multiple_of(9),
         age: Span::from_nanoseconds(if n.is_multiple_of(5) { n as i64 } else { 0 }),
     }
 }

@@ -9,7 +9,7 @@ use probepath_frames::{Span, Stamp};
 use super::connect::{Connected, Established, establish, release};
 use super::counts::UrCounts;
 use super::dashboard::Dashboard;
-use super::link::Link;
+use super::link::{Link, OLDER};
 use super::measured::Measured;
 use super::registers::{command, state};
 use super::settings::TICK;
@@ -67,6 +67,10 @@ pub struct UrArm {
     /// The shortest so far.
     round_trip: Duration,
     same_echo: u32,
+    /// What the last exchange left commanded.
+    commanded: Joints,
+    /// What came together with the newest package, and is older.
+    overtaken: Vec<State>,
     fault: Option<ArmFault>,
 }
 
@@ -96,6 +100,8 @@ impl UrArm {
             emptied: None,
             round_trip: Duration::MAX,
             same_echo: 0,
+            commanded: joints(&last.target),
+            overtaken: Vec::with_capacity(OLDER),
             fault: None,
         })
     }
@@ -160,8 +166,8 @@ impl UrArm {
         self.first_tick = self.first_tick.min(ticks(last.timestamp_s));
         self.fault = None;
         self.counts.connections += 1;
-        let joints = joints(&last.target);
-        Ok(self.state(joints, Span::ZERO))
+        self.commanded = joints(&last.target);
+        Ok(self.state(self.commanded, Span::ZERO))
     }
 
     /// Shows words on the pendant. Not from within a motion: it waits for the dashboard.
@@ -221,11 +227,15 @@ impl UrArm {
 
     /// The newest package as everybody else knows it.
     fn state(&self, commanded: Joints, age: Span) -> State {
-        let last = &self.last;
+        self.state_of(&self.last, commanded, age)
+    }
+
+    /// A package as everybody else knows it.
+    fn state_of(&self, last: &Measured, commanded: Joints, age: Span) -> State {
         let position = joints(&last.position);
         let base_from_flange = self.settings.model.forward(&position);
         State {
-            tick: self.tick(),
+            tick: self.tick_of(last),
             stamp: Stamp::from_nanoseconds((last.timestamp_s * 1e9).round() as i64),
             position,
             velocity: joints(&last.velocity),
@@ -234,6 +244,23 @@ impl UrArm {
             guiding: last.status_bits & safety::TEACH_BUTTON != 0,
             safety: safety::of_bits(last.safety_bits).0,
             age,
+        }
+    }
+
+    /// The packages that came together with the newest, as everybody else knows them: older by their own stamps, and
+    /// from before the command of this exchange.
+    fn overtake(&mut self, newest: &State, commanded_before: Joints) {
+        self.overtaken.clear();
+        for n in 0..self.link.as_ref().map_or(0, |link| link.older.len()) {
+            let Some(older) = self.link.as_ref().and_then(|link| link.older.get(n)) else { continue };
+            let mut state = self.state_of(older, commanded_before, newest.age);
+            let behind = (newest.stamp - state.stamp).nanoseconds();
+            state.age = Span::from_nanoseconds(newest.age.nanoseconds().saturating_add(behind));
+            let known = state.position.iter().all(|q| q.is_finite()) && state.tick < newest.tick;
+            // The room was asked for while connecting.
+            if known && self.overtaken.len() < OLDER {
+                self.overtaken.push(state);
+            }
         }
     }
 
@@ -259,6 +286,8 @@ impl UrArm {
 
 impl Arm for UrArm {
     fn exchange(&mut self, command: &Command) -> Result<State, ArmFault> {
+        self.overtaken.clear();
+        let before = self.commanded;
         if let Some(fault) = &self.fault {
             let fault = fault.clone();
             self.last_word();
@@ -277,7 +306,14 @@ impl Arm for UrArm {
             Command::Stay => joints(&self.last.target),
         };
         let age = self.age();
-        Ok(self.state(commanded, age))
+        let state = self.state(commanded, age);
+        self.overtake(&state, before);
+        self.commanded = commanded;
+        Ok(state)
+    }
+
+    fn overtaken(&self) -> &[State] {
+        &self.overtaken
     }
 
     fn period(&self) -> Span {

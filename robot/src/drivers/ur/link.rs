@@ -33,7 +33,11 @@ pub(super) struct Order {
     pub(super) setpoint: [f64; 6],
 }
 
-/// What came in: the newest package, and how many older ones came with it.
+/// So many packages that came together with a newer one are kept: half a second of them, after which every guard has
+/// stopped the arm.
+pub(super) const OLDER: usize = 256;
+
+/// What came in: the newest package; those that came before it and together with it are in [`Link::older`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Received {
     pub(super) newest: Measured,
@@ -53,6 +57,9 @@ pub(super) struct Link {
     words: [u8; WORDS],
     said: usize,
     pub(super) texts: u64,
+    /// The packages that came together with a newer one since [`forget`](Self::forget), oldest first; no more than there
+    /// is room for.
+    pub(super) older: Vec<Measured>,
 }
 
 impl Link {
@@ -72,6 +79,7 @@ impl Link {
             words: [0; WORDS],
             said: 0,
             texts: 0,
+            older: Vec::with_capacity(OLDER),
         };
         link.version_2()?;
         link.wait_at_most(PATIENCE)?;
@@ -198,6 +206,11 @@ impl Link {
         self.socket.write(&self.packet, doing)
     }
 
+    /// Forgets the packages that were overtaken: a new exchange begins.
+    pub(super) fn forget(&mut self) {
+        self.older.clear();
+    }
+
     /// Waits for the next package, and gives the newest of those that have come. No heap.
     pub(super) fn receive(&mut self, patience: Duration) -> Result<Received, UrError> {
         let (began, doing) = (clock::now(), "waiting for its next package");
@@ -210,7 +223,7 @@ impl Link {
         }
     }
 
-    /// Reads away what has come while nobody asked; how many packages that was. No heap.
+    /// Reads away what has come while nobody asked, into [`older`](Self::older); how many packages that was. No heap.
     pub(super) fn drain(&mut self) -> Result<u64, UrError> {
         let doing = "reading what came meanwhile";
         let io = |source| UrError::Io { what: "RTDE server", doing, source };
@@ -225,7 +238,10 @@ impl Link {
         let began = clock::now();
         // As much as a full receive buffer holds, and then it is enough.
         for _ in 0..256 {
-            packages += self.newest(doing)?.map_or(0, |received| received.older + 1);
+            if let Some(received) = self.newest(doing)? {
+                packages += received.older + 1;
+                keep_older(&mut self.older, received.newest);
+            }
             match self.socket.read(self.decoder.room(), doing, began, PATIENCE) {
                 Ok(count) => self.decoder.filled(count),
                 Err(UrError::Silent { .. }) => break,
@@ -237,13 +253,16 @@ impl Link {
 
     /// The newest of the whole packages that wait in the decoder.
     fn newest(&mut self, doing: &'static str) -> Result<Option<Received>, UrError> {
-        let (mut newest, mut older) = (None, 0);
+        let (mut newest, mut older): (Option<Measured>, u64) = (None, 0);
         while let Some(frame) = self.decoder.next().map_err(error::rtde(doing))? {
             match Reply::read(frame, Version::V2).map_err(error::rtde(doing))? {
                 Reply::Data { recipe, fields } => {
                     self.outputs.check(recipe, fields).map_err(error::rtde(doing))?;
-                    older += u64::from(newest.is_some());
-                    newest = Some(measured(&self.outputs, fields).map_err(error::rtde(doing))?);
+                    let next = measured(&self.outputs, fields).map_err(error::rtde(doing))?;
+                    if let Some(overtaken) = newest.replace(next) {
+                        older += 1;
+                        keep_older(&mut self.older, overtaken);
+                    }
                 }
                 Reply::Text(text) => {
                     self.texts += 1;
@@ -254,6 +273,13 @@ impl Link {
             }
         }
         Ok(newest.map(|newest| Received { newest, older }))
+    }
+}
+
+/// Keeps a package that was overtaken, where there is room.
+fn keep_older(older: &mut Vec<Measured>, overtaken: Measured) {
+    if older.len() < older.capacity().min(OLDER) {
+        older.push(overtaken);
     }
 }
 

@@ -47,7 +47,7 @@ fn the_rust_types_are_what_the_text_says() {
     let mut record = encode::tick(&tick(12, &mut noise));
     // Every field set to something, so that every field is on the wire.
     (record.stay, record.guiding, record.freedrive) = (true, true, true);
-    (record.safety, record.age_ns) = ("reduced".into(), 1);
+    (record.safety, record.age_ns, record.overtaken) = ("reduced".into(), 1, true);
     let wrench = record.wrench.as_mut().unwrap();
     wrench.force_y_n = 1.0;
     let bscan = encode::bscan(&placed(5, (8, 8), &mut noise));

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use probepath_frames::Span;
 
 use super::super::link::{Link, Order, Received};
+use super::super::measured::Measured;
 use super::super::registers::{command, state};
 use super::super::{UrError, clock, safety};
 use super::{KEPT, UrArm, ticks};
@@ -58,6 +59,7 @@ impl UrArm {
         };
         let mut drained = 0;
         self.emptied = None;
+        link.forget();
         if away {
             drained = link.drain().map_err(lost)?;
             self.emptied = Some(clock::now());
@@ -152,7 +154,12 @@ impl UrArm {
 
     /// Ticks of the controller since we connected.
     pub(super) fn tick(&self) -> u64 {
-        u64::try_from(ticks(self.last.timestamp_s) - self.first_tick).unwrap_or(0)
+        self.tick_of(&self.last)
+    }
+
+    /// The same, when a package was sent.
+    pub(super) fn tick_of(&self, package: &Measured) -> u64 {
+        u64::try_from(ticks(package.timestamp_s) - self.first_tick).unwrap_or(0)
     }
 
     /// How old the newest package is: it was measured after the script had the sequence number that it echoes, so it
