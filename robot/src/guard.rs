@@ -26,7 +26,8 @@
 //! |  | implausible wrench, force, sideways force, pressure |
 //!
 //! While the arm gives way to the hand by its own means ([`Command::Freedrive`](crate::Command::Freedrive)) there is no
-//! command to judge: the probe's measured place and speed are judged instead.
+//! command to judge: the probe's measured place and speed are judged instead, by the limits of the motion alone: what a
+//! confirmation slows down is what is commanded, and it waits for that.
 
 mod confirm;
 mod judge;
@@ -237,7 +238,7 @@ impl Guard {
             return Verdict::Stop(Trip::NotConfirmed);
         };
         let last = watch.last;
-        watch.see(state, dt, &self.limits);
+        watch.see(state, dt, &self.limits, free);
         let found = self
             .late(&last, state, watch.stale_ns)
             .or_else(|| self.frozen(&watch, dt))

@@ -19,7 +19,7 @@ impl Guard {
         let place = self.probe.as_ref()?;
         let next = place(position);
         let before = watch.probe.replace(next).unwrap_or(next);
-        self.too_fast(watch, &before, &next, dt).or_else(|| {
+        self.too_fast(watch, &before, &next, (dt, watch.allowance.speed_m_s)).or_else(|| {
             let bounded = self.tilt.is_some() || !self.workspace.planes().is_empty();
             if bounded { self.outside(&place(&brakes_at()), &before) } else { None }
         })
@@ -29,7 +29,8 @@ impl Guard {
     pub(super) fn judge_free(&self, watch: &mut Watch, state: &State, dt: f64) -> Option<Trip> {
         let next = self.probe.as_ref()?(&state.position);
         let before = watch.probe.replace(next).unwrap_or(next);
-        self.too_fast(watch, &before, &next, dt).or_else(|| self.outside(&next, &before))
+        // The hand leads: nothing was commanded that a confirmation could slow down.
+        self.too_fast(watch, &before, &next, (dt, f64::INFINITY)).or_else(|| self.outside(&next, &before))
     }
 
     fn too_fast(
@@ -37,11 +38,11 @@ impl Guard {
         watch: &Watch,
         before: &Pose<Base, Probe>,
         next: &Pose<Base, Probe>,
-        dt: f64,
+        (dt, allowed_m_s): (f64, f64),
     ) -> Option<Trip> {
         let speed_m_s = before.origin().distance(&next.origin()) / dt;
         let limit_m_s = self.limits.speed_m_s(-watch.last.wrench.force.z, watch.reduced_s);
-        let limit_m_s = limit_m_s.min(watch.allowance.speed_m_s);
+        let limit_m_s = limit_m_s.min(allowed_m_s);
         (speed_m_s > limit_m_s).then_some(Trip::ProbeSpeed { speed_m_s, limit_m_s })
     }
 

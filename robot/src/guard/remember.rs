@@ -9,7 +9,9 @@ pub struct Allowance {
     /// The largest force (N) that is tolerated now: the hard limit, or more while the probe is lifted out of too much
     /// force; it follows the force down and never rises.
     pub force_n: f64,
-    /// The fastest that the probe may go (m/s): little after a confirmation, e times more every second of motion.
+    /// The fastest that the probe may be commanded (m/s): little after a confirmation, e times more every second of
+    /// motion that is commanded. A hand that leads an arm which gives way by its own means is no command: it is held to
+    /// the usual limits, and the pace waits for what is commanded after it.
     pub speed_m_s: f64,
 }
 
@@ -44,9 +46,9 @@ impl Allowance {
         }
     }
 
-    /// A tick later.
-    fn after(self, force_n: f64, dt: f64, limits: &GuardLimits) -> Self {
-        let speed = self.speed_m_s * (1.0 + dt);
+    /// A tick later; `free` when the arm gave way to the hand by its own means.
+    fn after(self, force_n: f64, dt: f64, limits: &GuardLimits, free: bool) -> Self {
+        let speed = self.speed_m_s * if free { 1.0 } else { 1.0 + dt };
         Self {
             force_n: limits.force_hard_n.max(self.force_n.min(force_n + WHILE_LIFTING)),
             speed_m_s: if speed > PACE_OVER { f64::INFINITY } else { speed },
@@ -96,14 +98,14 @@ impl Watch {
     }
 
     /// Takes in the next state.
-    pub(super) fn see(&mut self, state: &State, dt: f64, limits: &GuardLimits) {
+    pub(super) fn see(&mut self, state: &State, dt: f64, limits: &GuardLimits, free: bool) {
         let new = state.tick != self.last.tick && state.stamp > self.last.stamp;
         self.stale_ns = if new { 0 } else { self.stale_ns + (dt * 1e9) as i64 };
         let same = state.wrench == self.last.wrench;
         self.same_wrench = if same { self.same_wrench.saturating_add(1) } else { 0 };
         self.wrench_lives |= !same;
         self.reduced_s = (state.safety == Safety::Reduced).then(|| self.reduced_s.unwrap_or(0.0) + dt);
-        self.allowance = self.allowance.after(state.wrench.force.norm(), dt, limits);
+        self.allowance = self.allowance.after(state.wrench.force.norm(), dt, limits, free);
         self.pressure = self.contact.as_mut().map(|contact| contact.step(&state.wrench));
         self.last = *state;
     }

@@ -272,6 +272,42 @@ fn while_the_arm_gives_way_the_guard_goes_on_watching() {
 }
 
 #[test]
+fn right_after_a_confirmation_a_hand_may_lead_at_its_own_pace_and_what_is_commanded_after_it_is_slow() {
+    let confirmed = |arm: &mut TestArm| {
+        let mut guard = guard().within(Workspace::new(), place());
+        guard.stop(Trip::Operator);
+        guard.end(&arm.state);
+        guard.confirm(&arm.exchange(&Command::Stay).unwrap()).unwrap();
+        guard
+    };
+    // Three seconds at 100 mm/s, then a motion at 20 mm/s.
+    let mut arm = TestArm::new(Fails { hand: 0.1, ..Fails::default() });
+    let mut guard = confirmed(&mut arm);
+    let out = PointToPoint::plan(&Joints::zeros(2), &Joints::zeros(2), &limits(), PERIOD).unwrap();
+    let mut handed = Handed { out, ticks: 0, free: 1..1500, end: 1500, held: None };
+    run(&mut arm, &mut handed, &mut guard, &mut ()).unwrap();
+    let led = arm.state.commanded;
+    assert!(led[0] > 0.25, "the hand moved it to {} rad", led[0]);
+    let slow = |guard: &mut Guard, arm: &mut TestArm, speed: f64| {
+        let limits = MotionLimits { velocity: Joints::splat(2, speed), ..limits() };
+        let to = led.zip(&Joints::from_slice(&[0.2 * speed, 0.0]).unwrap(), |at, by| at + by);
+        let mut motion = PointToPoint::plan(&arm.state.commanded, &to, &limits, PERIOD).unwrap();
+        run(arm, &mut motion, guard, &mut ())
+    };
+    let error = slow(&mut guard, &mut arm, 0.02).unwrap_err();
+    assert!(matches!(error.reason, StopReason::Guard(Trip::ProbeSpeed { .. })), "{error}");
+    // The usual limits hold for the hand too.
+    let mut arm = TestArm::new(Fails { hand: 0.3, ..Fails::default() });
+    let limits_of = GuardLimits { free_speed_m_s: 0.25, skin_speed_m_s: 0.25, ..GuardLimits::default() };
+    let mut guard = confirmed(&mut arm);
+    guard.set_limits(limits_of);
+    let out = PointToPoint::plan(&Joints::zeros(2), &Joints::zeros(2), &limits(), PERIOD).unwrap();
+    let mut handed = Handed { out, ticks: 0, free: 1..1500, end: 1500, held: None };
+    let error = run(&mut arm, &mut handed, &mut guard, &mut ()).unwrap_err();
+    assert!(matches!(error.reason, StopReason::Guard(Trip::ProbeSpeed { .. })), "{error}");
+}
+
+#[test]
 fn an_operators_stop_while_the_arm_gives_way_ends_at_rest() {
     let operator = Operator::new();
     let (mut arm, mut guard) =

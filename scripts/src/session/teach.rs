@@ -140,7 +140,8 @@ impl Session {
         };
         let done = motion::perform(moving, &mut *controller, &mut self.guard, &mut recorder);
         self.now = recorder.now;
-        self.resuming &= done.is_err();
+        // A hand that led the arm was no commanded motion: the next one that is begins slowly.
+        self.resuming &= done.is_err() || by == GuideBy::Freedrive;
         self.guard.set_limits(usual);
         done
     }
