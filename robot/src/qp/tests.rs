@@ -2,7 +2,9 @@
 //! alone satisfies, and Clarabel, an interior-point solver, as the independent road.
 
 use clarabel::algebra::CscMatrix;
-use clarabel::solver::{DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
+use clarabel::solver::{
+    DefaultSettings, DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus, SupportedConeT,
+};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
@@ -91,8 +93,20 @@ fn off_conditions(qp: &Qp<N, M>, solution: &QpSolution<N, M>) -> f64 {
     worst
 }
 
+fn usual() -> DefaultSettings<f64> {
+    DefaultSettingsBuilder::default().verbose(false).build().unwrap()
+}
+
+/// As near as rounding lets it come. With its usual 1e-8 of the objective, a minimum as flat as a step's (the joints'
+/// weight is 1e-2 of the part's) is known to some 1e-3 only: that is how far the two were apart.
+fn tight() -> DefaultSettings<f64> {
+    let mut settings = usual();
+    (settings.tol_gap_abs, settings.tol_gap_rel, settings.tol_feas) = (1e-15, 1e-15, 1e-15);
+    settings
+}
+
 /// The same problem by Clarabel: the minimum, or none where it finds a certificate that there is none.
-fn by_clarabel(qp: &Qp<N, M>) -> Option<Vec<f64>> {
+fn by_clarabel(qp: &Qp<N, M>, settings: DefaultSettings<f64>) -> Option<Vec<f64>> {
     let n = qp.variables;
     let upper: Vec<Vec<f64>> =
         (0..n).map(|i| (0..n).map(|k| if k >= i { qp.hessian[k][i] } else { 0.0 }).collect()).collect();
@@ -102,13 +116,14 @@ fn by_clarabel(qp: &Qp<N, M>) -> Option<Vec<f64>> {
     let a = if rows.is_empty() { CscMatrix::zeros((0, n)) } else { CscMatrix::from(&rows) };
     let cones =
         [SupportedConeT::ZeroConeT(qp.equalities), SupportedConeT::NonnegativeConeT(qp.len - qp.equalities)];
-    let settings = DefaultSettingsBuilder::default().verbose(false).build().unwrap();
     let mut solver =
         DefaultSolver::new(&CscMatrix::from(&upper), &qp.gradient[..n], &a, &bounds, &cones, settings)
             .unwrap();
     solver.solve();
     match solver.solution.status {
-        SolverStatus::Solved | SolverStatus::AlmostSolved => Some(solver.solution.x),
+        SolverStatus::Solved | SolverStatus::AlmostSolved | SolverStatus::InsufficientProgress => {
+            Some(solver.solution.x)
+        }
         SolverStatus::PrimalInfeasible | SolverStatus::AlmostPrimalInfeasible => None,
         other => panic!("clarabel: {other:?}"),
     }
@@ -135,7 +150,7 @@ fn clarabel_finds_the_same_minimum_or_the_same_lack_of_one() {
     let (mut solved, mut none, mut worst) = (0, 0, 0.0_f64);
     for case in 0..3000 {
         let qp = problem(&mut rng, if case % 2 == 0 { Bounds::Kept } else { Bounds::Any });
-        match (qp.solve(), by_clarabel(&qp)) {
+        match (qp.solve(), by_clarabel(&qp, usual())) {
             (Ok(ours), Some(theirs)) => {
                 let off = ours.x.iter().zip(&theirs).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
                 let size = theirs.iter().fold(1.0_f64, |most, x| most.max(x.abs()));
@@ -148,6 +163,66 @@ fn clarabel_finds_the_same_minimum_or_the_same_lack_of_one() {
     }
     eprintln!("{solved} solved, at most {worst:e} apart; {none} that nothing satisfies");
     assert!(solved > 1500 && none > 300, "{solved} {none}");
+}
+
+fn objective(qp: &Qp<N, M>, x: &[f64]) -> f64 {
+    let symmetric = |i: usize, k: usize| if k <= i { qp.hessian[i][k] } else { qp.hessian[k][i] };
+    let bent = |i: usize| (0..qp.variables).map(|k| symmetric(i, k) * x[k]).sum::<f64>();
+    (0..qp.variables).map(|i| x[i] * (qp.gradient[i] + 0.5 * bent(i))).sum()
+}
+
+/// A problem as a step has it: the probe's six directions are kept exactly, as far along the way as the joints' ends and
+/// a plane allow.
+fn of_a_step(rng: &mut ChaCha8Rng, joints: usize) -> Qp<N, M> {
+    let n = joints + 1;
+    let (mut hessian, mut gradient) = ([[0.0; N]; N], [0.0; N]);
+    for (i, row) in hessian.iter_mut().enumerate().take(n) {
+        row[i] = if i == joints { 1.0 } else { 1e-2 };
+    }
+    gradient[joints] = -2.0;
+    let mut qp = Qp::new(n, hessian, gradient).unwrap();
+    let goal = row(rng, joints).map(|x| 0.3 * x);
+    for _ in 0..6 {
+        let mut row = row(rng, joints);
+        row[joints] = -row.iter().zip(&goal).map(|(a, x)| a * x).sum::<f64>();
+        qp.equal(row, 0.0).unwrap();
+    }
+    for variable in 0..n {
+        let part = variable == joints;
+        for (sign, end) in [(1.0, if part { 0.0 } else { -0.4 }), (-1.0, if part { -1.0 } else { -0.4 })] {
+            let mut row = [0.0; N];
+            row[variable] = sign;
+            qp.at_least(row, if part { end } else { end * between(rng, 0.05, 1.0) }).unwrap();
+        }
+    }
+    qp.at_least(row(rng, joints), -0.2).unwrap();
+    qp
+}
+
+#[test]
+fn the_programs_of_steps_with_six_and_seven_joints_have_clarabels_minimum_at_the_tightest_tolerance() {
+    for joints in [6, 7] {
+        let mut rng = ChaCha8Rng::seed_from_u64(joints as u64);
+        let (mut worst, mut conditions, mut better) = (0.0_f64, 0.0_f64, 0.0_f64);
+        for case in 0..2000 {
+            let qp = of_a_step(&mut rng, joints);
+            let ours = qp.solve().unwrap_or_else(|error| panic!("case {case}: {error}"));
+            let theirs =
+                by_clarabel(&qp, tight()).unwrap_or_else(|| panic!("case {case}: clarabel has none"));
+            worst = ours.x.iter().zip(&theirs).fold(worst, |most, (a, b)| most.max((a - b).abs()));
+            let scale = 1.0 + ours.multipliers.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
+            conditions = conditions.max(off_conditions(&qp, &ours) / scale);
+            better = better.max(objective(&qp, &ours.x) - objective(&qp, &theirs));
+        }
+        eprintln!(
+            "{joints} joints: at most {worst:e} from clarabel's, whose objective is at most {better:e} lower; \
+             {conditions:e} off the conditions"
+        );
+        // The conditions say that ours is the minimum. An interior-point method stays inside of limits that bind with
+        // next to no multiplier, by the root of what its objective still lacks: six joints leave no choice, seven do.
+        assert!(conditions < 1e-13 && better < 1e-9, "{joints} joints: {conditions:e}, {better:e}");
+        assert!(worst < if joints == 6 { 1e-10 } else { 2e-5 }, "{joints} joints: {worst:e}");
+    }
 }
 
 #[test]
