@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use nalgebra::Vector3;
 use probepath_frames::{Base, Pose, Probe, Stamp, World};
 use probepath_robot::motion::follow::{Curve, PoseCurve};
-use probepath_robot::{Command, Joints, MotionLimits, Operator};
+use probepath_robot::{Command, Joints, MotionLimits, Operator, Row};
 use probepath_teach_replay::Path as TaughtPath;
 use probepath_us_capture::exam::Exam;
 
@@ -41,8 +41,9 @@ pub fn shares(exam: &Exam, limits: &MotionLimits) -> Result<Shares, SessionError
     let dt = exam.header.period.seconds();
     let mut shares = Shares::default();
     let mut past: Vec<Joints> = Vec::new();
-    for record in &exam.ticks {
-        let (command, state) = recorded_row(record)?;
+    // What came together with a newer state was commanded once.
+    for record in exam.ticks.iter().filter(|record| !record.overtaken) {
+        let Row { command, state, .. } = recorded_row(record)?;
         let position = match command {
             Command::Position(position) => position,
             // Told to stay, the arm is where it was last told to be.
