@@ -62,7 +62,8 @@ impl Session {
         self.say("Guide the ball pointer into every landmark.");
         // The simulated hand stands in for the operator's.
         let simulated = self.cell.simulated.as_ref().ok_or(SessionError::Order(
-            "landmarks are touched only in a cell that is simulated in this process: use the phantom's place as measured",
+            "on its wire the landmarks are not touched: the pointer would hang in the probe's place, and payload, guard and \
+             kinematics are the probe's there; measure where the phantom stands and use its place as the cell's file has it",
         ))?;
         let touches = simulated.touches(postures)?;
         let of = |landmark: usize| -> Vec<Pose<World, Flange>> {
