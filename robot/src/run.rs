@@ -90,7 +90,7 @@ impl StopReason {
 }
 
 /// How many ticks a controller gets to come to rest along its path after the operator's stop.
-const TICKS_TO_HALT: u64 = 40;
+const TICKS_TO_HALT: u64 = 35;
 
 /// How many ticks an arm gets to come to rest before a motion begins.
 const TICKS_TO_REST: u64 = 5000;
