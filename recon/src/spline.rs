@@ -44,6 +44,11 @@ impl Knots {
         (first, values.map(|value| value / (self.step * self.step)))
     }
 
+    /// How long an interval is.
+    pub(crate) const fn step_m(&self) -> f64 {
+        self.step
+    }
+
     /// How many intervals there are.
     pub(crate) const fn intervals(&self) -> usize {
         self.intervals

@@ -1,20 +1,23 @@
 //! How far each contour is to be believed: less when its size or its place is not its neighbours'.
 
+use super::bends::Bends;
 use super::samples::Samples;
-use super::tube::{BEND, BEND_M};
 use crate::centreline::add;
-use crate::spline::{Banded, Knots};
+use crate::spline::Banded;
 
 /// How often contours that stand apart lose weight.
 const ROUNDS: usize = 6;
 /// What poses may be off by, one by one, before a contour's place is doubted (m).
 const PLACE_SD_M: f64 = 0.15e-3;
 
-/// From curves of the mean radii and of the places across the vessel, which outliers do not pull (Huber).
-pub(super) fn of(knots: &Knots, contours: &[Samples]) -> Option<Vec<f64>> {
+/// From curves of the mean radii and of the places across the vessel, which outliers do not pull (Huber). The bends
+/// follow the curve of the radii.
+pub(super) fn of(bends: &mut Bends, contours: &[Samples]) -> Option<Vec<f64>> {
     let mut trust = vec![1.0; contours.len()];
+    let knots = *bends.knots();
     for _ in 0..ROUNDS {
-        let curves = curves(knots, contours, &trust)?;
+        let curves = curves(bends, contours, &trust)?;
+        bends.follow(&curves[0]);
         for (trust, contour) in trust.iter_mut().zip(contours) {
             let (first, along) = knots.basis(contour.at);
             let off: [f64; 3] = std::array::from_fn(|k| {
@@ -29,7 +32,8 @@ pub(super) fn of(knots: &Knots, contours: &[Samples]) -> Option<Vec<f64>> {
     Some(trust)
 }
 
-fn curves(knots: &Knots, contours: &[Samples], trust: &[f64]) -> Option<[Vec<f64>; 3]> {
+fn curves(bends: &Bends, contours: &[Samples], trust: &[f64]) -> Option<[Vec<f64>; 3]> {
+    let knots = bends.knots();
     let size = knots.coefficients();
     let mut matrix = Banded::new(size, 3);
     let mut rights: [Vec<f64>; 3] = std::array::from_fn(|_| vec![0.0; size]);
@@ -43,7 +47,7 @@ fn curves(knots: &Knots, contours: &[Samples], trust: &[f64]) -> Option<[Vec<f64
     }
     for (at, weight) in knots.bend_integral() {
         let (first, bend) = knots.bend(at);
-        add(&mut matrix, first, &bend, weight / (BEND * BEND * BEND_M));
+        add(&mut matrix, first, &bend, weight * bends.weight(at));
     }
     (0..size).for_each(|i| matrix.add(i, i, 1e4));
     let factor = matrix.factor()?;

@@ -3,6 +3,7 @@
 use nalgebra::{SMatrix, SVector};
 use probepath_frames::{Point, World};
 
+use super::bends::Bends;
 use super::equations;
 use super::samples::Samples;
 use super::trust;
@@ -16,13 +17,6 @@ pub(crate) const HARMONICS: usize = 5;
 pub(crate) const AROUND: usize = 2 * HARMONICS + 1;
 /// Distance of the farthest unknowns that meet in one point.
 pub(crate) const SPAN: usize = 4 * AROUND - 1;
-/// Distance of the knots along (m).
-const KNOT_M: f64 = 2e-3;
-/// How sharply radii bend along the vessel (1/m), and over which length (m). Stiffer keeps more speckle out and widens
-/// short stenoses: with 80 a stenosis of 10 mm came out 2.0 % too wide instead of 0.4 %, and single areas scattered by
-/// 1.93 % instead of 2.04 %.
-pub(super) const BEND: f64 = 120.0;
-pub(super) const BEND_M: f64 = 5e-3;
 /// No lumen is drawn narrower (m).
 const LEAST_RADIUS_M: f64 = 0.05e-3;
 
@@ -182,10 +176,11 @@ fn solve(contours: &[Samples]) -> Option<(Shape, Factor)> {
     if end.is_nan() || end <= start {
         return None;
     }
-    let knots = Knots::over(start, end, KNOT_M);
-    let trust = trust::of(&knots, contours)?;
+    let mut bends = Bends::usual(start, end);
+    let trust = trust::of(&mut bends, contours)?;
+    let knots = bends.knots_for_all(start, end);
     let (mut matrix, right) = equations::normal(&knots, contours, &trust);
-    stiffen(&mut matrix, &knots);
+    stiffen(&mut matrix, &knots, &bends);
     let factor = matrix.factor()?;
     let coefficients = factor.solve(right);
     Some((Shape { knots, coefficients }, factor))
@@ -203,12 +198,12 @@ pub(crate) fn harmonics_of((cos, sin): (f64, f64)) -> [f64; AROUND] {
 }
 
 /// Adds the penalty on bends along the vessel: the shape around changes more slowly than the size.
-fn stiffen(matrix: &mut Banded, knots: &Knots) {
+fn stiffen(matrix: &mut Banded, knots: &Knots, bends: &Bends) {
     for (at, weight) in knots.bend_integral() {
         let (first, bend) = knots.bend(at);
         for harmonic in 0..AROUND {
-            let sd = BEND / [1.0, 2.0, 2.0, 4.0, 4.0, 4.0][harmonic.div_ceil(2)];
-            let weight = weight / (sd * sd * BEND_M);
+            let stiffer = [1.0, 4.0, 4.0, 16.0, 16.0, 16.0][harmonic.div_ceil(2)];
+            let weight = weight * stiffer * bends.weight(at);
             for (a, left) in bend.iter().enumerate() {
                 for (b, right) in bend.iter().enumerate().take(a + 1) {
                     let (i, j) = ((first + a) * AROUND + harmonic, (first + b) * AROUND + harmonic);
