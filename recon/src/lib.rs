@@ -62,11 +62,12 @@ pub use follow_up::{
 pub use live::{AreaSoFar, LiveLumen, VesselSoFar, View};
 pub use lumen::{Contour, ImageLumen, LumenFinder, NoLumen, Tracker, segment};
 pub use mesh::{Mesh, MeshError, PointScalars};
+pub use probepath_us_capture::point_spread::PointSpread;
 pub use reconstruct::{
     ImageCounts, LumenReconstruction, ReconWarning, check_sweep, reconstruct_from, reconstruct_lumen,
 };
 pub use section::{NotMeasured, Section, SectionMeasure};
-pub use settings::{LumenSettings, PointSpread, SeedPoint};
+pub use settings::{LumenSettings, SeedPoint};
 pub use stenosis::{Reference, ReferenceChoice, ReferenceSide, Stenosis};
 pub use surface::LumenSurface;
 pub use uncertainty::ErrorBudget;

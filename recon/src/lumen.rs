@@ -109,9 +109,6 @@ fn first_borders(
 /// How often the wall is fitted again with what the neighbouring images say about the beam's thickness.
 const PASSES: usize = 1;
 
-/// How well the point spread is known, as a part of itself.
-const SPREAD_SD: f64 = 0.1;
-
 /// What every fit needs.
 struct Look<'a> {
     table: &'a PowerOfGrey,
@@ -137,9 +134,9 @@ impl Look<'_> {
         let depth = setting.window_top_m + region.centre.1;
         let spread = &self.settings.point_spread;
         let sigma = (spread.lateral_m(depth, setting) / FWHM, spread.axial_fwhm_m / FWHM);
-        let wall = self.settings.wall_thickness_m;
+        let (wall, sigma_sd) = (self.settings.wall_thickness_m, self.settings.point_spread_sd);
         let (bscan, table) = (&image.bscan, self.table);
-        fit::fit(&FitInput { bscan, table, region, sigma, sigma_sd: SPREAD_SD, wall, planes, earlier })
+        fit::fit(&FitInput { bscan, table, region, sigma, sigma_sd, wall, planes, earlier })
     }
 
     /// The contour of a border that is one of a lumen.

@@ -1,6 +1,7 @@
-//! How a lumen is looked for: [`LumenSettings`], and the machine's [`PointSpread`].
+//! How a lumen is looked for: [`LumenSettings`].
 
-use probepath_us_capture::Setting;
+use probepath_us_capture::Calibration;
+use probepath_us_capture::point_spread::PointSpread;
 use serde::{Deserialize, Serialize};
 
 use crate::{ErrorBudget, ReconError, ReferenceChoice};
@@ -15,6 +16,8 @@ pub struct LumenSettings {
     pub dynamic_range_db: f64,
     /// The point spread that the wall is seen through.
     pub point_spread: PointSpread,
+    /// How well that is known, as a part of itself (one standard deviation).
+    pub point_spread_sd: f64,
     /// Depths under the probe's face between which a lumen is looked for without a seed (m).
     pub depth_range_m: (f64, f64),
     /// Smallest and largest radius of a lumen (m).
@@ -58,6 +61,7 @@ impl Default for LumenSettings {
             seed: None,
             dynamic_range_db: 60.0,
             point_spread: PointSpread::default(),
+            point_spread_sd: 0.1,
             depth_range_m: (0.005, 0.060),
             radius_range_m: (0.0008, 0.0075),
             wall_thickness_m: 0.0008,
@@ -70,7 +74,24 @@ impl Default for LumenSettings {
     }
 }
 
+/// What a wire's thickness and the model's form leave open of a measured point spread, as a part of it.
+const MEASURED_SD: f64 = 0.03;
+
 impl LumenSettings {
+    /// The default, with what a calibration says: how sure it is, and the point spread where its wires told it.
+    pub fn of(calibration: &Calibration) -> Self {
+        let usual = Self { errors: ErrorBudget::of(calibration), ..Self::default() };
+        let measured = calibration.quality.as_ref().and_then(|quality| quality.point_spread);
+        measured.map_or_else(
+            || usual.clone(),
+            |measured| Self {
+                point_spread: measured.metres(&calibration.setting),
+                point_spread_sd: measured.relative_sd().hypot(MEASURED_SD),
+                ..usual.clone()
+            },
+        )
+    }
+
     /// Whether every number can be worked with.
     ///
     /// # Errors
@@ -85,6 +106,7 @@ impl LumenSettings {
             ("wall_thickness_m", self.wall_thickness_m),
             ("longest_gap_m", self.longest_gap_m),
             ("point_spread.axial_fwhm_m", self.point_spread.axial_fwhm_m),
+            ("point_spread_sd", self.point_spread_sd),
             ("point_spread.lateral_fwhm_m", self.point_spread.lateral_fwhm_m),
             ("point_spread.elevational_fwhm_m", self.point_spread.elevational_fwhm_m),
         ];
@@ -119,62 +141,5 @@ impl LumenSettings {
     }
 }
 
-/// Full widths at half maximum of the image of a point, in amplitude, as functions of depth.
-///
-/// The shape is that of a focused beam: `lateral(z) = w sqrt(1 + ((z - k F) / l)^2)`, widened by the distance of
-/// the lines, and likewise across the plane; the default figures are [P1]'s at 3 cm (axial 0.3-0.4 mm, lateral
-/// 1-2 mm, elevational 3-4 mm) in the form of FIELD.md section 8. Measure your own on a wire.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct PointSpread {
-    /// Along the beam (m).
-    pub axial_fwhm_m: f64,
-    /// Along the array, at the narrowest (m).
-    pub lateral_fwhm_m: f64,
-    /// Where it is narrowest, as a part of the focus depth.
-    pub lateral_waist_of_focus: f64,
-    /// How far from there it is `sqrt(2)` times as wide (m).
-    pub lateral_depth_of_field_m: f64,
-    /// Distance of the lines for each metre of depth and each metre of window width (1/m).
-    pub line_spacing_per_m2: f64,
-    /// Across the plane, at the narrowest (m).
-    pub elevational_fwhm_m: f64,
-    /// Where that is (m).
-    pub elevational_focus_m: f64,
-    /// How far from there it is `sqrt(2)` times as wide (m).
-    pub elevational_depth_of_field_m: f64,
-}
-
-impl Default for PointSpread {
-    fn default() -> Self {
-        Self {
-            axial_fwhm_m: 0.35e-3,
-            lateral_fwhm_m: 0.95e-3,
-            lateral_waist_of_focus: 0.78,
-            lateral_depth_of_field_m: 14e-3,
-            // 0.1 mm a centimetre of depth, for a window of 40 mm.
-            line_spacing_per_m2: 0.1e-3 / 0.01 / 0.040,
-            elevational_fwhm_m: 3.0e-3,
-            elevational_focus_m: 30e-3,
-            elevational_depth_of_field_m: 28e-3,
-        }
-    }
-}
-
 /// Full width at half maximum of a Gaussian of standard deviation 1.
 pub(crate) const FWHM: f64 = 2.354_820_045_030_949;
-
-impl PointSpread {
-    /// Lateral full width at `depth_m` (m).
-    pub fn lateral_m(&self, depth_m: f64, setting: &Setting) -> f64 {
-        let off = (depth_m - self.lateral_waist_of_focus * setting.focus_m) / self.lateral_depth_of_field_m;
-        let lines = 2.0 * self.line_spacing_per_m2 * setting.depth_m * setting.window_width_m;
-        (self.lateral_fwhm_m * (1.0 + off * off).sqrt()).hypot(lines)
-    }
-
-    /// Elevational full width at `depth_m` (m).
-    pub fn elevational_m(&self, depth_m: f64) -> f64 {
-        let off = (depth_m - self.elevational_focus_m) / self.elevational_depth_of_field_m;
-        self.elevational_fwhm_m * (1.0 + off * off).sqrt()
-    }
-}

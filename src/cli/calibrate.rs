@@ -89,6 +89,10 @@ pub struct Spatial {
     /// The lag (s), where it is known: an image stamped t belongs to the pose at t + lag. Estimated otherwise.
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub lag_s: Option<f64>,
+    /// What lies between grey 0 and 255, as the machine's panel says it: with it the width of the beam is read from the
+    /// wires, and stored.
+    #[arg(long, value_name = "DB")]
+    pub dynamic_range_db: Option<f64>,
 }
 
 /// `calibrate temporal`

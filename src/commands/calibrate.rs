@@ -36,6 +36,7 @@ fn spatial(args: Spatial, screen: &Screen) -> Outcome {
         nominal: args.nominal,
         any_side: args.any_side,
         lag_s: args.lag_s,
+        dynamic_range_db: args.dynamic_range_db,
         date: today(),
     };
     Ok(Document::of(&calibrate::spatial(&request, &*screen.progress())?)?)

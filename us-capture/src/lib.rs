@@ -21,6 +21,7 @@ pub mod phantom;
 mod pixel_map;
 pub mod plan;
 pub mod plus;
+pub mod point_spread;
 pub mod pointer;
 pub mod sequence;
 pub mod shots;

@@ -5,6 +5,7 @@ use probepath_us_capture::exam::Attachment;
 use probepath_us_capture::fit::{Lag, Parameter, PhantomPlace, Scale, in_tissue, speed_of_sound_in_water};
 use probepath_us_capture::label::Expect;
 use probepath_us_capture::plan::Expected;
+use probepath_us_capture::point_spread::{NoSpread, PointSpreadMm, read_from_wires};
 use probepath_us_capture::spatial::{Doing, Evaluation, Spatial, SpatialError, SpatialOptions};
 use probepath_us_capture::{
     Calibration, CalibrationError, FoundMm, PixelSpacing, PromisedMm, Quality, Setting, Water,
@@ -40,6 +41,8 @@ pub struct Calibrated {
     pub water_celsius: f64,
     /// What the arm's own error does, were every dot exact.
     pub arm: Option<Expected>,
+    /// The point spread that the wires told, or why they did not.
+    pub spread: Result<PointSpreadMm, NoSpread>,
     /// What has been found on images that it has not used.
     pub held: Option<Evaluation>,
 }
@@ -139,6 +142,7 @@ impl Calibrated {
                 speed_of_sound_m_s: speed_of_sound_in_water(self.water_celsius),
                 assumed_m_s: ASSUMED_M_S,
             }),
+            point_spread: self.spread.clone().ok(),
             standard_error: PromisedMm { mean_mm: error.mean_m * 1e3, p95_mm: error.p95_m * 1e3 },
             ..Quality::of(&self.spatial.fit, self.size)
         }
@@ -206,7 +210,9 @@ impl Session {
             ));
         }
         let arm = images.visits.error_of_the_arm(&spatial, images.setting, images.shots.size());
+        let spread = self.point_spread(&spatial, images);
         let calibrated = Calibrated {
+            spread,
             spatial,
             setting: images.setting,
             size: images.shots.size(),
@@ -228,6 +234,17 @@ impl Session {
             self.warn(&weak.to_string());
         }
         Ok(calibrated)
+    }
+
+    /// How wide the wires of the same images show the beam.
+    fn point_spread(&mut self, spatial: &Spatial, images: &PhantomImages) -> Result<PointSpreadMm, NoSpread> {
+        let range_db = self.cell.file.dynamic_range_db().ok_or(NoSpread::NoRange);
+        let read = range_db.and_then(|db| read_from_wires(spatial, &images.shots, &images.setting, db));
+        self.say(&match &read {
+            Ok(found) => found.to_string(),
+            Err(why) => format!("The point spread was not read from the wires: {why}."),
+        });
+        read
     }
 
     fn spatial_options(&self, images: &PhantomImages, wish: &CalibrateWish) -> SpatialOptions {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use probepath_frames::Stamp;
-use probepath_recon::{ErrorBudget, LumenReconstruction, LumenSettings, SeedPoint, reconstruct_lumen};
+use probepath_recon::{LumenReconstruction, LumenSettings, SeedPoint, reconstruct_lumen};
 use probepath_robot::motion::timing::PathSpeed;
 use probepath_robot::{Operator, Phase};
 use probepath_teach_replay::{
@@ -26,8 +26,7 @@ pub(crate) const SCAN_FIGURES: &str = "scan.json";
 
 /// How a lumen is looked for in images that were taken with a calibration.
 pub(crate) fn lumen_settings(calibration: Option<&Calibration>) -> LumenSettings {
-    let errors = calibration.map(ErrorBudget::of).unwrap_or_default();
-    LumenSettings { errors, ..LumenSettings::default() }
+    calibration.map(LumenSettings::of).unwrap_or_default()
 }
 
 /// How a path is to be scanned.

@@ -77,3 +77,49 @@ impl Drop for Folder {
 pub(super) fn tell(progress: &dyn Progress, what: &str, done: u64, of: u64) {
     progress.at(what, done as f64 / of.max(1) as f64);
 }
+
+#[cfg(test)]
+mod tests {
+    use probepath_sim::{CellConfig, Window};
+    use probepath_us_capture::point_spread::PointSpread;
+
+    use super::*;
+
+    /// What `factors` (axial, lateral, elevational) times the usual point spread reads as, on the bench, zoomed or not.
+    fn off(seed: u64, factors: [f64; 3], window: Window) -> [f64; 3] {
+        let mut simulated = CellConfig::wire_phantom();
+        simulated.machine.window = window;
+        let imaging = &mut simulated.machine.imaging;
+        imaging.axial_fwhm_m *= factors[0];
+        (imaging.lateral_factor, imaging.elevational_factor) = (factors[1], factors[2]);
+        let folder = Folder::new(&format!("spread-{seed}")).unwrap();
+        let cell = CellFile { simulated, ..CellFile::wire_phantom() };
+        let mut session = open(&cell, seed, folder.path(), (Operator::new(), Arc::new(()))).unwrap();
+        let calibrated = calibrated_on_the_bench(&mut session).unwrap();
+        session.close().unwrap();
+        let stored = calibrated.stored(None);
+        let read = stored.quality.unwrap().point_spread.unwrap();
+        let (ours, model) = (read.metres(&stored.setting), PointSpread::default());
+        // Where the vessel of the phantom and of a thigh lies.
+        let depth_m = 34e-3;
+        let lateral = ours.lateral_m(depth_m, &stored.setting) / model.lateral_m(depth_m, &stored.setting);
+        let axial = ours.axial_fwhm_m / model.axial_fwhm_m;
+        let elevational = ours.elevational_m(depth_m) / model.elevational_m(depth_m);
+        let off =
+            [axial / factors[0], lateral / factors[1], elevational / factors[2]].map(|ratio| ratio - 1.0);
+        eprintln!("seed {seed}, {factors:?}: off by {off:.3?}; {read}");
+        off
+    }
+
+    #[test]
+    fn beams_of_other_widths_than_the_models_are_read_from_the_wires() {
+        let zoom = Window::Zoom { top_mm: 19.0, height_mm: 30.0 };
+        let cases =
+            [(1, [1.43, 1.4, 1.0], zoom), (2, [0.8, 0.8, 1.25], zoom), (3, [1.0, 1.0, 1.0], Window::Whole)];
+        for (seed, factors, window) in cases {
+            let [axial, lateral, elevational] = off(seed, factors, window);
+            assert!(axial.abs() < 0.04 && lateral.abs() < 0.04, "seed {seed}: {axial} {lateral}");
+            assert!(elevational.abs() < 0.12, "seed {seed}: {elevational}");
+        }
+    }
+}

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{BadCalibration, check};
 use crate::errors::{Found, Repeatability, Summary};
 use crate::fit::{Fit, Uncertainty};
+use crate::point_spread::PointSpreadMm;
 
 /// Depths that errors are kept apart for (m).
 const BAND_M: f64 = 0.01;
@@ -37,6 +38,9 @@ pub struct Quality {
     /// Where the phantom stood, as the fit found it: where a check looks for it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub world_from_phantom: Option<NamedPose>,
+    /// How wide the image of a point is, where the wires told it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub point_spread: Option<PointSpreadMm>,
     /// The covariance of what was fitted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub covariance: Option<Covariance>,
@@ -149,6 +153,7 @@ impl Quality {
             repeatability: None,
             water: None,
             world_from_phantom: Some(NamedPose::from(&fit.world_from_phantom)),
+            point_spread: None,
             covariance: Some(Covariance::of(&fit.uncertainty)),
         }
     }
@@ -175,6 +180,10 @@ impl Quality {
         }
         if let Some(water) = &self.water {
             water.check()?;
+        }
+        for (field, number, least) in self.point_spread.iter().flat_map(PointSpreadMm::numbers) {
+            let (good, wanted) = least.holds(number);
+            check(good, field, number, wanted)?;
         }
         self.place()?;
         self.covariance.as_ref().map_or(Ok(()), Covariance::check)

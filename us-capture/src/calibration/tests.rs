@@ -4,6 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::PixelSpacing;
+use crate::point_spread::PointSpreadMm;
 
 fn calibration() -> Calibration {
     Calibration {
@@ -41,6 +42,23 @@ fn place() -> Pose<World, Phantom> {
     Pose::assume(Isometry3::new(Vector3::new(0.25, -0.125, 0.0), Vector3::new(0.0, 0.5, 0.0)))
 }
 
+fn spread() -> PointSpreadMm {
+    PointSpreadMm {
+        dots: 1500,
+        dynamic_range_db: 50.0,
+        axial_fwhm_mm: 0.5,
+        axial_sd_mm: 0.0125,
+        lateral_fwhm_mm: 1.75,
+        lateral_sd_mm: 0.03,
+        lateral_waist_depth_mm: 35.0,
+        lateral_depth_of_field_mm: 14.0,
+        elevational_fwhm_mm: 3.25,
+        elevational_sd_mm: 0.2,
+        elevational_waist_depth_mm: -3.5,
+        elevational_depth_of_field_mm: 28.0,
+    }
+}
+
 fn quality() -> Quality {
     let errors = ErrorsMm {
         mids: 300,
@@ -67,6 +85,7 @@ fn quality() -> Quality {
         repeatability: Some(RepeatabilityMm { calibrations: 10, points: 600, c_rms_mm: 0.4, mean_mm: 0.35 }),
         water: Some(Water { temperature_celsius: 20.0, speed_of_sound_m_s: 1482.3, assumed_m_s: 1540.0 }),
         world_from_phantom: Some(NamedPose::from(&place())),
+        point_spread: Some(spread()),
         covariance: Some(Covariance {
             parameters: vec!["image_turn_x".into(), "lag".into()],
             units: vec!["rad".into(), "s".into()],
@@ -97,6 +116,10 @@ fn a_quality_that_cannot_be_is_refused_with_the_reason() {
         ("line_rms_mm = 0.3", "line_rms_mm = -0.3", "quality.found"),
         ("temperature_celsius = 20.0", "temperature_celsius = 293.0", "temperature_celsius"),
         ("speed_of_sound_m_s = 1482.3", "speed_of_sound_m_s = 1.48", "speed_of_sound_m_s"),
+        ("axial_fwhm_mm = 0.5", "axial_fwhm_mm = 0.0", "quality.point_spread.axial_fwhm_mm"),
+        ("lateral_sd_mm = 0.03", "lateral_sd_mm = -0.03", "quality.point_spread.lateral_sd_mm"),
+        ("waist_depth_mm = -3.5", "waist_depth_mm = nan", "quality.point_spread.elevational_waist_depth_mm"),
+        ("dots = 1500", "dots = -1", "dots"),
         ("of = \"Phantom\"", "of = \"Image\"", "World_T_Phantom"),
         ("[0.25, -0.125, 0.0]", "[0.25, nan, 0.0]", "world_from_phantom"),
         ("\"lag\"", "\"image_turn_x\"", "twice"),

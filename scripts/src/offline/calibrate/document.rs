@@ -9,6 +9,7 @@ use probepath_us_capture::PixelSpacing;
 use probepath_us_capture::RepeatabilityMm;
 use probepath_us_capture::errors::Found;
 use probepath_us_capture::fit::{Parameter, Uncertainty};
+use probepath_us_capture::point_spread::PointSpreadMm;
 use probepath_us_capture::spatial::Seen;
 use serde::Serialize;
 
@@ -41,6 +42,9 @@ pub struct Spatial {
     /// The labelled dots of the calibration's images.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dots: Option<Vec<ImageDots>>,
+    /// How wide the wires show the beam; absent where nobody said what grey levels stand for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub point_spread: Option<PointSpreadMm>,
     /// Every parameter that was fitted, with its uncertainty.
     pub covariance: Covariance,
     /// Directions that the images hardly determine, and what to do about them.

@@ -44,6 +44,8 @@ pub struct SpatialRequest {
     pub scale: Option<Scale>,
     /// Temperature of the phantom's water (Celsius).
     pub water_celsius: f64,
+    /// What lies between grey 0 and 255 (dB): the width of the beam is read from the wires with it.
+    pub dynamic_range_db: Option<f64>,
     /// Where the image is on the probe, about: an earlier calibration (.toml) or a PLUS configuration (.xml).
     pub nominal: Option<PathBuf>,
     /// The probe may look at the phantom from either side: a mirrored image is not looked for.

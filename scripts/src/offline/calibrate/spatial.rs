@@ -45,6 +45,11 @@ pub fn spatial(request: &SpatialRequest, progress: &dyn Progress) -> Result<Spat
         nominal::check(&nominal, &found.fit.probe_from_image)?;
     }
     let mut document = document(request, &subject, &recording, &found);
+    match store::point_spread(request, &recording.shots, &found) {
+        Some(Ok(read)) => document.point_spread = Some(read),
+        Some(Err(why)) => document.notes.push(format!("the point spread was not read from the wires: {why}")),
+        None => {}
+    }
     let mut errors = (found.evaluation.found.clone(), false);
     if let (Some(other), Some(path)) = (&other, &request.validate) {
         let watch = watching(progress, "validating", 0.7, 0.9);
@@ -62,7 +67,8 @@ pub fn spatial(request: &SpatialRequest, progress: &dyn Progress) -> Result<Spat
     pictures(request, &subject, &recording, "calibration", Some(&found.fit), &found.seen)?;
     if let Some(path) = &request.out {
         let size = recording.shots.size();
-        store::write(path, request, size, &found.fit, &subject.phantom.name, (&errors.0, errors.1))?;
+        let (fit, spread) = (&found.fit, document.point_spread);
+        store::write(path, request, size, (fit, spread), &subject.phantom.name, (&errors.0, errors.1))?;
         document.stored = Some(path.clone());
     }
     Ok(document)
@@ -103,6 +109,7 @@ fn document(request: &SpatialRequest, subject: &Subject, recording: &Recording, 
         dots: calibration.dots.clone(),
         calibration,
         validation: None,
+        point_spread: None,
         covariance: Covariance::of(&fit.uncertainty),
         weak: fit.weak.iter().map(ToString::to_string).collect(),
         notes: notes.into_iter().flatten().cloned().collect(),

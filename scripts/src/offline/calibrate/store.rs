@@ -4,6 +4,9 @@ use std::path::Path;
 
 use probepath_us_capture::errors::{Found as Errors, Summary};
 use probepath_us_capture::fit::{Fit, in_tissue, speed_of_sound_in_water};
+use probepath_us_capture::point_spread::{NoSpread, PointSpreadMm, read_from_wires};
+use probepath_us_capture::shots::Shots;
+use probepath_us_capture::spatial::Spatial;
 use probepath_us_capture::{Calibration, CalibrationError, FoundMm, PixelSpacing, Quality, Setting, Water};
 
 use super::CalibrateError;
@@ -21,14 +24,13 @@ pub(super) fn write(
     path: &Path,
     request: &SpatialRequest,
     size: (usize, usize),
-    fit: &Fit,
+    (fit, spread): (&Fit, Option<PointSpreadMm>),
     phantom: &str,
     (errors, held_out): (&Errors, bool),
 ) -> Result<(), CalibrateError> {
     let name =
         request.sequence.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-    let in_water = request.scale == Some(Scale::Water);
-    let setting = setting(if in_water { fit.uncertainty.nominal() } else { fit.spacing }, size);
+    let setting = setting_of(request, size, fit);
     let calibration = Calibration {
         id: format!("{}-{}", request.date, name.trim_end_matches(".igs")),
         date: request.date.clone(),
@@ -41,10 +43,26 @@ pub(super) fn write(
         quality: Some(Quality {
             found: FoundMm::of(errors, held_out),
             water: water(request),
+            point_spread: spread,
             ..Quality::of(fit, size)
         }),
     };
     Ok(calibration.write(path)?)
+}
+
+/// How wide the wires show the beam, where somebody said what grey levels stand for.
+pub(super) fn point_spread(
+    request: &SpatialRequest,
+    shots: &Shots,
+    found: &Spatial,
+) -> Option<Result<PointSpreadMm, NoSpread>> {
+    let setting = setting_of(request, shots.size(), &found.fit);
+    Some(read_from_wires(found, shots, &setting, request.dynamic_range_db?))
+}
+
+fn setting_of(request: &SpatialRequest, size: (usize, usize), fit: &Fit) -> Setting {
+    let in_water = request.scale == Some(Scale::Water);
+    setting(if in_water { fit.uncertainty.nominal() } else { fit.spacing }, size)
 }
 
 /// The water, where the pixels' size was corrected by it.

@@ -112,6 +112,15 @@ impl Default for ForceFile {
 }
 
 impl CellFile {
+    /// What lies between grey 0 and 255 (dB), as the machine's panel says it.
+    pub(in crate::session) fn dynamic_range_db(&self) -> Option<f64> {
+        match self.machine.address {
+            MachineAddress::Sim => Some(self.simulated.machine.imaging.dynamic_range_db),
+            MachineAddress::Igtl { .. } => self.machine.dynamic_range_db,
+            MachineAddress::None => None,
+        }
+    }
+
     /// The simulated bench with a phantom of wires in water.
     pub fn wire_phantom() -> Self {
         let simulated = CellConfig::wire_phantom();

@@ -70,6 +70,9 @@ pub struct MachineFile {
     /// anybody calibrated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub holder_error_mm: Option<f64>,
+    /// What lies between grey 0 and 255 (dB), as its panel says it: the width of the beam is read from wires with it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dynamic_range_db: Option<f64>,
     /// How it is set.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub setting: Option<SettingMm>,
@@ -89,6 +92,9 @@ impl MachineFile {
         within("machine.latency_ms", latency_ms, (0.0, 2000.0), "ms")?;
         let error_mm = self.holder_error_mm.ok_or_else(|| missing("machine.holder_error_mm"))?;
         within("machine.holder_error_mm", error_mm, (0.0, 20.0), "mm")?;
+        if let Some(range_db) = self.dynamic_range_db {
+            within("machine.dynamic_range_db", range_db, (20.0, 120.0), "dB")?;
+        }
         can_be(self.setting.as_ref().ok_or_else(|| missing("machine.setting"))?)
     }
 
@@ -98,6 +104,7 @@ impl MachineFile {
             ("machine.latency_ms", self.latency_ms.is_some()),
             ("machine.clock", self.clock.is_some()),
             ("machine.holder_error_mm", self.holder_error_mm.is_some()),
+            ("machine.dynamic_range_db", self.dynamic_range_db.is_some()),
             ("machine.setting", self.setting.is_some()),
         ];
         let Some((field, _)) = given.into_iter().find(|(_, given)| *given) else { return Ok(()) };

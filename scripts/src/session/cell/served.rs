@@ -41,6 +41,7 @@ impl CellFile {
             latency_ms: Some(nominal.image_latency.nanoseconds() as f64 / 1e6),
             clock: Some(MachineClock::Arm),
             holder_error_mm: Some(config.machine.calibration_error_mm),
+            dynamic_range_db: Some(config.machine.imaging.dynamic_range_db),
             setting: Some(SettingMm::of(&nominal.setting)),
         };
         let phantom = nominal.bench.as_ref().zip(named(cell)).map(|(bench, model)| PhantomFile {
