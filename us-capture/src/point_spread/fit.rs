@@ -218,7 +218,7 @@ mod tests {
                     Seen { wire: k % 40, depth: 15e-3 + 20e-3 * (1.0 + dice()), slope, shape: [0.0; 3] };
                 let clean = truth.shape(&bare);
                 let size = truth.size(&bare);
-                let wrong = if k % 10 == 0 { 1.0 + dice().abs() } else { 0.0 };
+                let wrong = if k.is_multiple_of(10) { 1.0 + dice().abs() } else { 0.0 };
                 let shape = std::array::from_fn(|i| clean[i] + size[i] * (0.08 * dice() + wrong));
                 Seen { shape, ..bare }
             };
