@@ -81,8 +81,8 @@ pub struct Reconstruct {
     #[arg(long)]
     pub volume: bool,
     /// A place in the lumen of the first image: right of its first column and below its first row (mm). Found otherwise.
-    #[arg(long, value_name = "X,Y", value_delimiter = ',', num_args = 2)]
-    pub seed_mm: Option<Vec<f64>>,
+    #[arg(long, value_name = "X,Y", value_parser = place)]
+    pub seed_mm: Option<(f64, f64)>,
     /// How.
     #[command(flatten)]
     pub volume_options: VolumeArgs,
@@ -96,6 +96,15 @@ pub struct Reconstruct {
     /// Folder for what is made.
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,
+}
+
+/// Two numbers with a comma between them.
+fn place(text: &str) -> Result<(f64, f64), String> {
+    let numbers: Vec<Result<f64, _>> = text.split(',').map(|part| part.trim().parse()).collect();
+    match numbers.as_slice() {
+        [Ok(x), Ok(y)] if x.is_finite() && y.is_finite() => Ok((*x, *y)),
+        _ => Err("a place is two numbers with a comma between them: 20,31.5".into()),
+    }
 }
 
 /// `compare`

@@ -78,10 +78,6 @@ fn arm(args: crate::cli::Arm, screen: &Screen) -> Outcome {
 
 fn reconstruct(args: crate::cli::Reconstruct, screen: &Screen) -> Outcome {
     let crate::cli::Reconstruct { input, calibration, volume, volume_options, seed_mm, lumen, .. } = args;
-    let seed_mm = match seed_mm.as_deref() {
-        Some(&[x_mm, y_mm]) => Some((x_mm, y_mm)),
-        _ => None,
-    };
     let lumen = lumen.map(|program| offline::FinderWish { program, seconds: args.lumen_seconds });
     let (volume_options, out) = (volume_options.into(), args.out);
     let wish = offline::ReconstructWish { input, calibration, volume, volume_options, seed_mm, lumen, out };

@@ -11,6 +11,9 @@ mod follow_up;
 mod reconstruct;
 mod simulate;
 
+use std::fmt::Display;
+use std::path::Path;
+
 pub use probepath_recon::volume::{Compounding, Weights};
 
 pub use arm::{ArmAnswer, ArmError, ArmQuestion, arm};
@@ -22,3 +25,9 @@ pub use reconstruct::{
     VolumeOptions, reconstruct,
 };
 pub use simulate::{Served, ServedArm, ServedPort, SimulateError, SimulateRequest, Simulating, simulate};
+
+/// What is wrong, after the file it is wrong in; most errors that open a file say its name themselves.
+fn in_file(path: &Path, why: &impl Display) -> String {
+    let (path, why) = (path.display().to_string(), why.to_string());
+    if why.contains(&path) { why } else { format!("{path}: {why}") }
+}

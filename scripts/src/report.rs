@@ -67,9 +67,6 @@ pub struct Heading {
     /// Date of the exam, as given; none in a simulated cell.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub date: Option<String>,
-    /// Who held the probe, as a code; never a name.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub operator: Option<String>,
     /// What was scanned with: the cell's name.
     pub cell: String,
     /// Protocol's name.

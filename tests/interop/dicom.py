@@ -3,15 +3,18 @@
     python dicom.py US_MULTI_FRAME ENCAPSULATED_STL STRUCTURED_REPORT      needs pydicom and highdicom from PyPI
 
 dicom-validator (PyPI) fetches the standard from the internet before it checks anything, so it cannot be part of the
-tests; where it can run: `validate_iods FILE`. What it would look for first, the attributes that each kind of file must
-have (PS3.3), is the table below.
+tests; where it can run: `validate_iods FILE`. Its first question, whether every attribute that a kind of file must have is
+there and none that it cannot have (PS3.3), is asked here, of the tables of the standard that highdicom brings along.
 """
 
 import io
+import json
 import struct
 import sys
 import warnings
+from pathlib import Path
 
+import highdicom
 import pydicom
 from pydicom import config
 
@@ -19,35 +22,9 @@ from pydicom import config
 config.settings.reading_validation_mode = config.RAISE
 warnings.simplefilter("error")
 
-# Attributes that must be there: with a value (1), or perhaps empty (2). PS3.3, the modules named.
-PATIENT = {"PatientName": 2, "PatientID": 2, "PatientBirthDate": 2, "PatientSex": 2, "PatientIdentityRemoved": 1,
-           "DeidentificationMethod": 1}  # C.7.1.1
-STUDY = {"StudyInstanceUID": 1, "StudyDate": 2, "StudyTime": 2, "ReferringPhysicianName": 2, "StudyID": 2,
-         "AccessionNumber": 2}  # C.7.2.1
-SERIES = {"Modality": 1, "SeriesInstanceUID": 1, "SeriesNumber": 1}  # C.7.3.1
-EQUIPMENT = {"Manufacturer": 1, "ManufacturerModelName": 1, "DeviceSerialNumber": 1, "SoftwareVersions": 1}  # C.7.5.2
-COMMON = {"SOPClassUID": 1, "SOPInstanceUID": 1, "InstanceNumber": 1}  # C.12.1
-ALL = PATIENT | STUDY | SERIES | EQUIPMENT | COMMON
-US = ALL | {
-    "ImageType": 1, "PatientOrientation": 2, "SamplesPerPixel": 1, "PhotometricInterpretation": 1, "Rows": 1, "Columns": 1,
-    "BitsAllocated": 1, "BitsStored": 1, "HighBit": 1, "PixelRepresentation": 1, "PixelData": 1,  # C.7.6.3, C.8.5.6
-    "NumberOfFrames": 1, "FrameIncrementPointer": 1, "FrameTimeVector": 1,  # C.7.6.5, C.7.6.6
-    "SequenceOfUltrasoundRegions": 1, "LossyImageCompression": 1,
-}
-REGION = {name: 1 for name in (
-    "RegionSpatialFormat", "RegionDataType", "RegionFlags", "RegionLocationMinX0", "RegionLocationMinY0",
-    "RegionLocationMaxX1", "RegionLocationMaxY1", "PhysicalUnitsXDirection", "PhysicalUnitsYDirection",
-    "PhysicalDeltaX", "PhysicalDeltaY")}  # C.8.5.5
-STL = ALL | {
-    "FrameOfReferenceUID": 1, "PositionReferenceIndicator": 2, "ContentDate": 2, "ContentTime": 2, "AcquisitionDateTime": 2,
-    "BurnedInAnnotation": 1, "DocumentTitle": 2, "ConceptNameCodeSequence": 2, "MIMETypeOfEncapsulatedDocument": 1,
-    "EncapsulatedDocument": 1, "EncapsulatedDocumentLength": 1, "MeasurementUnitsCodeSequence": 1,  # C.24.2, C.35.1
-}
-SR = ALL | {
-    "ReferencedPerformedProcedureStepSequence": 2, "CompletionFlag": 1, "VerificationFlag": 1, "ContentDate": 1,
-    "ContentTime": 1, "PerformedProcedureCodeSequence": 2, "ValueType": 1, "ConceptNameCodeSequence": 1,
-    "ContinuityOfContent": 1, "ContentSequence": 1,  # C.17
-}
+STANDARD = Path(highdicom.__file__).parent / "_standard"
+# A module that a kind of file may do without, and that these files hold all the same.
+HELD = {"us-region-calibration"}
 
 
 def need(condition, what):
@@ -55,19 +32,43 @@ def need(condition, what):
         raise SystemExit(what)
 
 
-def required(data, table, what):
-    for name, kind in table.items():
-        need(name in data, f"{what}: {name} is missing")
-        value = data[name].value
-        empty = value is None or (hasattr(value, "__len__") and len(value) == 0)
-        need(kind == 2 or not empty, f"{what}: {name} is empty")
+def tables(sop_class):
+    """The attributes of a kind of file: those of its mandatory modules and of the ones in HELD, and all there may be."""
+    name = json.loads((STANDARD / "sop_class_iod_map.json").read_text())[sop_class]
+    modules = json.loads((STANDARD / "iod_module_map.json").read_text())[name]
+    attributes = json.loads((STANDARD / "module_attribute_map.json").read_text())
+    due = [a for m in modules if m["usage"] == "M" or m["key"] in HELD for a in attributes[m["key"]]]
+    known = {(*a["path"], a["keyword"]) for m in modules for a in attributes[m["key"]]}
+    return name, due, known
 
 
-def read(path, table, what):
+def inside(data, path):
+    """The items of a sequence in a sequence; none where one is absent or empty."""
+    items = [data]
+    for keyword in path:
+        items = [deeper for item in items if keyword in item for deeper in item[keyword].value or []]
+    return items
+
+
+def required(data, what):
+    """Type 1: there, with a value. Type 2: there. Those with a condition (1C, 2C) are not asked for."""
+    name, due, known = tables(data.SOPClassUID)
+    for attribute in due:
+        keyword, kind = attribute["keyword"], attribute["type"]
+        for item in inside(data, attribute["path"]) if kind in ("1", "2") else []:
+            need(keyword in item, f"{what} ({name}): {keyword} is missing in {attribute['path']}")
+            value = item[keyword].value
+            empty = value is None or (hasattr(value, "__len__") and len(value) == 0)
+            need(kind == "2" or not empty, f"{what} ({name}): {keyword} is empty")
+    strange = [element.keyword for element in data if (element.keyword,) not in known]
+    need(not strange, f"{what} ({name}): nothing of the kind has {strange}")
+
+
+def read(path, what):
     data = pydicom.dcmread(path)
     for element in data.iterall():
         element.value  # decoded, so checked
-    required(data, table, what)
+    required(data, what)
     need(data.file_meta.TransferSyntaxUID == "1.2.840.10008.1.2.1", f"{what}: not explicit little endian")
     need(data.file_meta.MediaStorageSOPInstanceUID == data.SOPInstanceUID, f"{what}: two instance UIDs")
     uids = [e.value for e in data.iterall() if e.VR == "UI"]
@@ -80,14 +81,13 @@ def read(path, table, what):
 
 
 def multi_frame(path):
-    data = read(path, US, "US multi-frame")
+    data = read(path, "US multi-frame")
     pixels = data.pixel_array
     need(pixels.shape == (int(data.NumberOfFrames), data.Rows, data.Columns), f"pixels of {pixels.shape}")
     times = [float(t) for t in data.FrameTimeVector]
     need(len(times) == len(pixels) and times[0] == 0 and all(t > 0 for t in times[1:]), f"times {times}")
     need(data.FrameIncrementPointer == 0x00181065, "the frames do not follow the vector of times")
     for region in data.SequenceOfUltrasoundRegions:
-        required(region, REGION, "region")
         need(region.PhysicalUnitsXDirection == 3 == region.PhysicalUnitsYDirection, "the region is not in centimetres")
         need(0.0001 < region.PhysicalDeltaX < 0.1 and 0.0001 < region.PhysicalDeltaY < 0.1, "no size of a pixel")
         need((region.RegionLocationMaxX1, region.RegionLocationMaxY1) == (data.Columns - 1, data.Rows - 1), "its corner")
@@ -96,7 +96,7 @@ def multi_frame(path):
 
 
 def stl(path):
-    data = read(path, STL, "encapsulated STL")
+    data = read(path, "encapsulated STL")
     need(data.MIMETypeOfEncapsulatedDocument == "model/stl", "MIME type")
     need(data.MeasurementUnitsCodeSequence[0].CodeValue == "mm", "unit")
     inside = data.EncapsulatedDocument[: data.EncapsulatedDocumentLength]
@@ -107,9 +107,7 @@ def stl(path):
 
 
 def report(path):
-    import highdicom
-
-    data = read(path, SR, "structured report")
+    data = read(path, "structured report")
     with warnings.catch_warnings():
         warnings.simplefilter("default")
         document = highdicom.sr.srread(path)

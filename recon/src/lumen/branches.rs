@@ -26,22 +26,46 @@ const SAME_M: f64 = 1.5e-3;
 struct Outline {
     image_from_world: Pose<Image, World>,
     points: Vec<(f64, f64)>,
+    /// The box round the points: its corners.
+    corners: [(f64, f64); 2],
     area_mm2: f64,
 }
 
 impl Outline {
     fn of(image: &PlacedBScan, contour: &Contour) -> Self {
         let spacing = image.bscan.setting.spacing;
-        let points = contour.pixels.iter().map(|p| (p.0 * spacing.x_m, p.1 * spacing.y_m)).collect();
+        let points: Vec<(f64, f64)> =
+            contour.pixels.iter().map(|p| (p.0 * spacing.x_m, p.1 * spacing.y_m)).collect();
         let image_from_world = image.world_from_image.inverse();
-        Self { image_from_world, points, area_mm2: contour.area_mm2 }
+        let low = points.iter().fold((f64::INFINITY, f64::INFINITY), |a, p| (a.0.min(p.0), a.1.min(p.1)));
+        let high =
+            points.iter().fold((f64::NEG_INFINITY, f64::NEG_INFINITY), |a, p| (a.0.max(p.0), a.1.max(p.1)));
+        Self { image_from_world, points, corners: [low, high], area_mm2: contour.area_mm2 }
     }
 
-    /// Whether a place of another image, seen along this one's normal, is inside; and how far along that is (m).
-    fn holds(&self, image: &PlacedBScan, place: (f64, f64)) -> Option<f64> {
-        let world = image.world_from_image * probepath_frames::Point::new(place.0, place.1, 0.0);
-        let here = (self.image_from_world * world).vector();
-        inside(&self.points, (here.x, here.y)).then_some(here.z.abs())
+    /// This outline beside another image.
+    fn beside(&self, image: &PlacedBScan) -> Beside<'_> {
+        Beside { outline: self, own_from_image: self.image_from_world * image.world_from_image }
+    }
+
+    fn holds(&self, place: (f64, f64)) -> bool {
+        let [low, high] = self.corners;
+        let near = (low.0..=high.0).contains(&place.0) && (low.1..=high.1).contains(&place.1);
+        near && inside(&self.points, place)
+    }
+}
+
+/// An outline, and how another image lies to its own.
+struct Beside<'o> {
+    outline: &'o Outline,
+    own_from_image: Pose<Image, Image>,
+}
+
+impl Beside<'_> {
+    /// Whether a place of the other image, seen along the outline's normal, is inside.
+    fn holds(&self, place: (f64, f64)) -> bool {
+        let here = (self.own_from_image * probepath_frames::Point::new(place.0, place.1, 0.0)).vector();
+        self.outline.holds((here.x, here.y))
     }
 }
 
@@ -103,14 +127,14 @@ impl Branches {
         look: &Look<'_>,
     ) -> Option<Contour> {
         let opened = |outline: &&Outline| outline.area_mm2 > LARGER * main.area_mm2;
-        let wide: Vec<&Outline> = self.outlines.iter().filter(opened).collect();
+        let wide: Vec<Beside<'_>> =
+            self.outlines.iter().filter(opened).map(|outline| outline.beside(image)).collect();
         if wide.is_empty() {
             return None;
         }
         let own = Outline::of(image, main);
-        let allowed = |place: (f64, f64)| {
-            !inside(&own.points, place) && wide.iter().any(|outline| outline.holds(image, place).is_some())
-        };
+        let allowed =
+            |place: (f64, f64)| !own.holds(place) && wide.iter().any(|outline| outline.holds(place));
         let place = seed::find(&image.bscan, look.table, look.settings, allowed).ok()?;
         let mut vessel = Followed::default();
         let contour = grown(image, look, &mut vessel, place)?;
@@ -139,18 +163,23 @@ fn apart(a: &Contour, b: &Contour) -> bool {
 /// The branches in every image of a sweep, looked for forward and backward: one that joins is one that leaves, seen
 /// from the other end.
 pub(super) fn in_sweep(images: &[PlacedBScan], look: &Look<'_>, found: &mut [ImageLumen]) {
-    let (mut forward, mut backward) = (Branches::default(), Branches::default());
-    for (image, lumen) in images.iter().zip(found.iter_mut()) {
-        lumen.others = forward.find(image, lumen.lumen.as_ref().ok(), look);
-    }
-    let mut again: Vec<(usize, Vec<Contour>)> = Vec::new();
-    for (index, (image, lumen)) in images.iter().zip(found.iter()).enumerate().rev() {
-        let others = backward.find(image, lumen.lumen.as_ref().ok(), look);
-        if !others.is_empty() {
-            again.push((index, others));
-        }
-    }
-    join(found, again, forward.known);
+    let there = || {
+        let mut branches = Branches::default();
+        let each = images.iter().zip(&*found);
+        let seen = each.map(|(image, lumen)| branches.find(image, lumen.lumen.as_ref().ok(), look));
+        let seen: Vec<Vec<Contour>> = seen.collect();
+        (seen, branches.known)
+    };
+    let back = || {
+        let mut branches = Branches::default();
+        let each = images.iter().zip(&*found).enumerate().rev();
+        let seen = each
+            .map(|(index, (image, lumen))| (index, branches.find(image, lumen.lumen.as_ref().ok(), look)));
+        seen.filter(|(_, others)| !others.is_empty()).collect()
+    };
+    let ((seen, known), again) = rayon::join(there, back);
+    found.iter_mut().zip(seen).for_each(|(lumen, others)| lumen.others = others);
+    join(found, again, known);
     drop_the_rare(found);
 }
 

@@ -43,7 +43,10 @@ fn vertex(out: &mut Vec<u8>, mesh: &Mesh, i: usize) {
 pub(super) fn read(bytes: &[u8]) -> Result<Mesh, String> {
     plausible(bytes)?;
     let mut reader = bytes;
-    let ply = Parser::<DefaultElement>::new().read_ply(&mut reader).map_err(|error| error.to_string())?;
+    // The parser says it in several lines.
+    let one_line = |said: String| said.split_whitespace().collect::<Vec<_>>().join(" ");
+    let ply =
+        Parser::<DefaultElement>::new().read_ply(&mut reader).map_err(|error| one_line(error.to_string()))?;
     let vertices = ply.payload.get("vertex").ok_or("it has no vertices")?;
     let faces = ply.payload.get("face").ok_or("it has no faces")?;
     let mut mesh = Mesh::default();

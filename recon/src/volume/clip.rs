@@ -59,11 +59,11 @@ impl Clip {
 
     /// Whether the pixel nearest to a place is used, and counts anything.
     pub(super) fn holds(&self, column: f64, row: f64) -> bool {
-        let (column, row) = ((column + 0.5).floor(), (row + 0.5).floor());
+        let (column, row) = (column + 0.5, row + 0.5);
         if !(column >= 0.0 && row >= 0.0 && row < self.height as f64) {
             return false;
         }
-        let (column, row) = (column as usize, row as usize);
+        let (column, row) = (column as u32 as usize, row as u32 as usize);
         let runs = match (self.first.get(row), self.first.get(row + 1)) {
             (Some(first), Some(end)) => self.runs.get(*first..*end).unwrap_or_default(),
             _ => &[],
@@ -71,6 +71,16 @@ impl Clip {
         let counts =
             |weights: &Vec<u8>| weights.get(row * self.width + column).is_some_and(|weight| *weight > 0);
         runs.iter().any(|(_, run)| run.contains(&column)) && self.weights.as_ref().is_none_or(counts)
+    }
+
+    /// The places that are used, along columns and rows, where they are a rectangle and all count alike.
+    pub(super) fn rectangle(&self) -> Option<[Range<f64>; 2]> {
+        let (columns, rows) = self.bounds()?;
+        let alike = self.weights.is_none()
+            && self.runs.len() == rows.len()
+            && self.runs.iter().all(|(_, run)| *run == columns);
+        // Pixels have a size: half of one round their centres.
+        alike.then(|| [columns, rows].map(|range| range.start as f64 - 0.5..range.end as f64 - 0.5))
     }
 
     /// Rows with their runs, from the top.
@@ -160,5 +170,22 @@ mod tests {
             let right = if used { !outside } else { !inside };
             assert!(right, "{x} {y}: {used}");
         }
+    }
+
+    #[test]
+    fn a_rectangle_holds_what_its_runs_hold() {
+        let rectangle = Some(probepath_us_capture::plus::Rectangle { origin: [7, 3], size: [20, 11] });
+        let clip = Clip::of(&Region { rectangle, fan: None }, 40, 30);
+        let [columns, rows] = clip.rectangle().unwrap_or_default();
+        let mut held = 0;
+        for (u, v) in (-8..170).flat_map(|u| (-8..130).map(move |v| (f64::from(u) / 4.0, f64::from(v) / 4.0)))
+        {
+            let inside = columns.contains(&u) && rows.contains(&v);
+            assert_eq!(inside, clip.holds(u, v), "{u} {v}");
+            held += usize::from(inside);
+        }
+        assert_eq!(held, 20 * 4 * 11 * 4);
+        let fan = Fan { origin_px: [20.0, -5.0], angles_rad: [-0.6, 0.5], radius_px: None };
+        assert!(Clip::of(&Region { rectangle: None, fan: Some(fan) }, 40, 30).rectangle().is_none());
     }
 }

@@ -6,6 +6,7 @@
 //! between two images on whose different sides it lies.
 
 mod pair;
+mod passing;
 mod thumb;
 
 use std::ops::Range;
@@ -111,14 +112,24 @@ impl Sweep {
         else {
             return;
         };
-        pair.rows(range, |y, z, columns| {
+        let rectangle = clip.rectangle();
+        let holds = |u: f64, v: f64| match &rectangle {
+            Some([columns, rows]) => columns.contains(&u) && rows.contains(&v),
+            None => clip.holds(u, v),
+        };
+        let alike = first.thumb.is_like(&second.thumb);
+        pair.rows(range, |[y, z], columns| {
             let Some((sums, marks)) = layers.row(y, z) else { return };
+            let passing = pair.passing(y as f64, z as f64);
             for x in columns {
                 let (Some(sum), Some(Mark::Unseen)) = (sums.get_mut(x), marks.get(x)) else { continue };
-                let Some((t, u, v)) = pair.passing([x as f64, y as f64, z as f64]) else { continue };
-                if clip.holds(u, v)
-                    && let Some(value) = between(first.thumb.at(u, v), second.thumb.at(u, v), t)
-                {
+                let Some((t, u, v)) = passing.at(x as f64) else { continue };
+                if !holds(u, v) {
+                    continue;
+                }
+                let spot = first.thumb.spot(u, v);
+                let other = if alike { spot } else { second.thumb.spot(u, v) };
+                if let Some(value) = between(first.thumb.at(&spot), second.thumb.at(&other), t) {
                     *sum += (value << COUNT) | 1;
                 }
             }
@@ -143,23 +154,26 @@ impl Layers<'_> {
 }
 
 /// In 256ths of a grey level: the nearer image counts more; where only one shows something, that.
-fn between(first: Option<f32>, second: Option<f32>, t: f64) -> Option<u64> {
-    let t = t as f32;
+fn between(first: Option<i32>, second: Option<i32>, t: f64) -> Option<u64> {
     let value = match (first, second) {
-        (Some(first), Some(second)) => first + t * (second - first),
+        (Some(first), Some(second)) => thumb::between(first, second, thumb::parts(t)),
         (Some(one), None) | (None, Some(one)) => one,
         (None, None) => return None,
     };
-    Some(value.round() as u64)
+    Some(u64::from(value.cast_unsigned()))
 }
 
 /// Where several sweeps lead through a voxel, their mean.
 fn finish(sums: &[u64], grey: &mut [u8], marks: &mut [Mark]) {
     for ((sum, grey), mark) in sums.iter().zip(grey).zip(marks) {
         let (count, sum) = (sum & ((1 << COUNT) - 1), sum >> COUNT);
-        if count > 0 {
-            (*grey, *mark) = (((sum + 128 * count) / (256 * count)) as u8, Mark::Filled);
-        }
+        // Mostly one; a division costs as much as all else here.
+        let mean = match count {
+            0 => continue,
+            1 => (sum + 128) >> 8,
+            _ => (sum + 128 * count) / (256 * count),
+        };
+        (*grey, *mark) = (mean as u8, Mark::Filled);
     }
 }
 

@@ -49,6 +49,11 @@ pub fn multi_frame(
     let mut notes = Vec::new();
     let mut set = DataSet::new();
     study.put(&mut set, &Series { modality: "US", number: 1, description: "B-scans across the artery" });
+    // Documents have no place for these two.
+    set.text(tags::BODY_PART_EXAMINED, VR::CS, "LEG");
+    if let Some(side) = study.laterality() {
+        set.text(tags::LATERALITY, VR::CS, side);
+    }
     instance(&mut set, uids::ULTRASOUND_MULTI_FRAME_IMAGE_STORAGE, &study.uid("us-multi-frame", &[]), 1);
     image(&mut set, first, burned_in, &mut notes);
     cine(&mut set, images, &mut notes);

@@ -88,10 +88,6 @@ impl Study {
         set.text(tags::SERIES_INSTANCE_UID, VR::UI, &self.uid("series", series.modality.as_bytes()));
         set.text(tags::SERIES_NUMBER, VR::IS, &series.number.to_string());
         set.text(tags::SERIES_DESCRIPTION, VR::LO, series.description);
-        set.text(tags::BODY_PART_EXAMINED, VR::CS, "LEG");
-        if let Some(side) = self.laterality() {
-            set.text(tags::LATERALITY, VR::CS, side);
-        }
         set.text(tags::MANUFACTURER, VR::LO, "probepath");
         set.text(tags::MANUFACTURER_MODEL_NAME, VR::LO, "probepath");
         set.text(tags::DEVICE_SERIAL_NUMBER, VR::LO, "none");

@@ -11,6 +11,7 @@ use probepath_us_capture::sequence::{ReadOptions, Sequence, SequenceError};
 use serde::Serialize;
 use thiserror::Error;
 
+use super::in_file;
 use crate::dicom::{Date, DicomError, Study, multi_frame};
 
 /// What was converted.
@@ -43,8 +44,13 @@ pub enum ConvertError {
         output: PathBuf,
     },
     /// A sequence or a volume.
-    #[error(transparent)]
-    Sequence(#[from] SequenceError),
+    #[error("{}", in_file(path, source))]
+    Sequence {
+        /// Its file.
+        path: PathBuf,
+        /// Why.
+        source: SequenceError,
+    },
     /// A surface.
     #[error(transparent)]
     Mesh(#[from] MeshError),
@@ -52,8 +58,13 @@ pub enum ConvertError {
     #[error(transparent)]
     Exam(#[from] ExamError),
     /// DICOM.
-    #[error(transparent)]
-    Dicom(#[from] DicomError),
+    #[error("{}", in_file(path, source))]
+    Dicom {
+        /// The exam.
+        path: PathBuf,
+        /// Why.
+        source: DicomError,
+    },
 }
 
 /// What an ending says a file is.
@@ -77,14 +88,14 @@ pub fn convert(input: &Path, output: &Path, no_burned_in: bool) -> Result<Conver
     let mut notes = Vec::new();
     let what = match (kind(input), kind(output)) {
         (Some(Kind::Sequence), Some(Kind::Sequence)) => {
-            let sequence = Sequence::read(input, &ReadOptions::default())?;
+            let sequence = Sequence::read(input, &ReadOptions::default()).map_err(at(input))?;
             notes.extend(sequence.notes().iter().map(ToString::to_string));
-            sequence.write(output)?;
+            sequence.write(output).map_err(at(output))?;
             format!("{} images of {} x {}", sequence.images().len(), sequence.width(), sequence.height())
         }
         (Some(Kind::Volume), Some(Kind::Volume)) => {
-            let volume = Volume::read(input, MOST_BYTES)?;
-            volume.write(output, Layer::Grey)?;
+            let volume = Volume::read(input, MOST_BYTES).map_err(at(input))?;
+            volume.write(output, Layer::Grey).map_err(at(output))?;
             let [x, y, z] = volume.grid().size;
             format!("a volume of {x} x {y} x {z}")
         }
@@ -97,6 +108,11 @@ pub fn convert(input: &Path, output: &Path, no_burned_in: bool) -> Result<Conver
         _ => return Err(ConvertError::NoWay { input: input.into(), output: output.into() }),
     };
     Ok(Converted { input: input.into(), output: output.into(), what, notes })
+}
+
+fn at(path: &Path) -> impl FnOnce(SequenceError) -> ConvertError {
+    let path = path.to_owned();
+    |source| ConvertError::Sequence { path, source }
 }
 
 /// The B-scans of an exam as a multi-frame image.
@@ -116,7 +132,8 @@ fn dicom(
     let study = Study::of(&exam.header.study_code, &side, Date::of_file(input), &exam.bscans);
     // A simulated machine writes nothing into its pictures.
     let burned_in = (no_burned_in || exam.header.seed.is_some()).then_some(false);
-    let frames = multi_frame(&exam.bscans, &study, burned_in, output)?;
+    let frames = multi_frame(&exam.bscans, &study, burned_in, output)
+        .map_err(|source| ConvertError::Dicom { path: input.into(), source })?;
     notes.extend(frames.notes);
     Ok(format!("{} B-scans of {} x {}", frames.count, frames.size.0, frames.size.1))
 }

@@ -115,6 +115,10 @@ pub struct Timing {
     pub volume: f64,
     /// All of it.
     pub total: f64,
+    /// What all processors worked for this process, in its whole life, where the system says: what else the computer
+    /// did meanwhile is not in it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub processors: Option<f64>,
 }
 
 /// Reconstructs an exam (`.mcap`) or a tracked sequence.
@@ -133,6 +137,7 @@ pub fn reconstruct(
     progress.at("reading", 0.0);
     let mut input = timed(&mut timing.reading, || read(wish))?;
     input.lumen.seed = wish.seed_mm.map(|(x_mm, y_mm)| SeedPoint::Millimetres { x_mm, y_mm });
+    let settings = wish.volume.then(|| wish.volume_options.over(&input.volume)).transpose()?;
     progress.at("looking for the lumen", 0.2);
     let found = lumen(wish, &input, &mut timing);
     let mut made = Reconstructed::of(wish, &input);
@@ -147,12 +152,13 @@ pub fn reconstruct(
         }
         Err(other) => return Err(other),
     }
-    if wish.volume {
+    if let Some(settings) = settings {
         progress.at("building the volume", 0.8);
-        let build = || volume::build(&input.slices(), &input.volume, &wish.volume_options, &wish.out);
+        let build = || volume::build(&input.slices(), &settings, &wish.volume_options, &wish.out);
         made.volume = Some(timed(&mut timing.volume, build)?);
     }
     timing.total = begun.elapsed().as_secs_f64();
+    timing.processors = processors_s();
     made.peak_memory_mb = peak_memory_mb();
     made.timing_s = timing;
     Ok(made)
@@ -178,6 +184,15 @@ fn peak_memory_mb() -> Option<f64> {
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     let kilobytes: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     Some(kilobytes / 1e3)
+}
+
+/// Linux says it in hundredths of a second, own and system's (proc(5)); elsewhere nobody is asked.
+fn processors_s() -> Option<f64> {
+    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
+    // The second field is a name, in brackets, with whatever in it.
+    let mut fields = stat.rsplit(')').next()?.split_whitespace().skip(11);
+    let mut hundredths = || fields.next()?.parse::<f64>().ok();
+    Some((hundredths()? + hundredths()?) / 100.0)
 }
 
 fn read(wish: &ReconstructWish) -> Result<Input, ReconstructError> {

@@ -54,15 +54,14 @@ fn heading(body: &mut String, report: &Report) {
     let of = &report.exam_of;
     let _ = write!(
         body,
-        "<header><h1>{}</h1><p>Study <b>{}</b> · {} · operator {}</p></header>",
+        "<header><h1>{}</h1><p>Study <b>{}</b> · {}</p></header>",
         if of.side.is_empty() {
             "Leg artery, side not given".into()
         } else {
             format!("Artery of the {} leg", escape(&of.side))
         },
         escape(&of.study),
-        escape(of.date.as_deref().unwrap_or("date not given")),
-        escape(of.operator.as_deref().unwrap_or("not given"))
+        escape(of.date.as_deref().unwrap_or("date not given"))
     );
     let worst = report.stenoses.iter().max_by(|a, b| a.percent_area.total_cmp(&b.percent_area));
     let verdict = worst.map_or_else(
@@ -101,15 +100,42 @@ fn warnings(body: &mut String, report: &Report) {
     body.push_str("</ul>");
 }
 
+/// What is said of each stenosis, after its name.
+const LESION: [&str; 11] = [
+    "Segment",
+    "Area lost",
+    "Diameter lost",
+    "Grade by diameter",
+    "Place",
+    "Length",
+    "Least area",
+    "Least diameter",
+    "Off the middle",
+    "Force",
+    "Reference",
+];
+/// What is said of each segment, after its name.
+const SEGMENT: [&str; 7] =
+    ["From", "To", "Mean area", "Mean diameter", "Smallest area", "Force", "Worst stenosis"];
+
+/// A row of a table. Where the page is too narrow for one, each cell has its column's name beside it.
+fn row(body: &mut String, name: &str, columns: &[&str], cells: &[String]) {
+    let _ = write!(body, "<tr><th>{}</th>", escape(name));
+    for (column, cell) in columns.iter().zip(cells) {
+        let _ = write!(body, "<td data-is='{column}'><div>{cell}</div></td>");
+    }
+    body.push_str("</tr>");
+}
+
 fn stenoses(body: &mut String, rows: &[StenosisRow]) {
     if rows.is_empty() {
         return;
     }
-    body.push_str(
-        "<h2>Stenoses</h2><table class='lesions'><thead><tr><th></th><th>Segment</th><th>Area lost</th>\
-         <th>Diameter lost</th><th>Grade by<br>diameter</th><th>Place</th><th>Length</th><th>Least<br>area</th><th>Least<br>diameter</th>\
-         <th>Off the<br>middle</th><th>Force</th><th>Reference</th></tr></thead><tbody>",
-    );
+    body.push_str("<h2>Stenoses</h2><table class='rows lesions'><thead><tr><th></th>");
+    for name in LESION {
+        let _ = write!(body, "<th>{name}</th>");
+    }
+    body.push_str("</tr></thead><tbody>");
     for s in rows {
         stenosis(body, s);
     }
@@ -129,6 +155,7 @@ fn stenosis(body: &mut String, s: &StenosisRow) {
     let force = s.force_n.map_or_else(|| "not measured".into(), |force| format!("{force:.1} N"));
     let asymmetry = s.asymmetry.map_or_else(|| "not known".to_owned(), |part| format!("{part:.2}"));
     let cells = [
+        or_not_named(&escape(&s.segment)).to_owned(),
         format!("<b>{:.1} %</b>{}", s.percent_area, span(s.percent_area_interval)),
         format!("<b>{:.1} %</b>{}", s.percent_diameter, span(s.percent_diameter_interval)),
         escape(&s.grade),
@@ -143,15 +170,9 @@ fn stenosis(body: &mut String, s: &StenosisRow) {
         format!("{:.1} mm{}", s.min_diameter_mm, span(s.min_diameter_interval_mm)),
         asymmetry,
         force,
+        format!("{:.1} mm²<span class='words'>{}</span>", s.reference_area_mm2, escape(&s.reference)),
     ];
-    let (name, segment) = (escape(&s.name), escape(&s.segment));
-    let _ = write!(body, "<tr><th>{name}</th><td>{}</td>", or_not_named(&segment));
-    for cell in cells {
-        let _ = write!(body, "<td class='n'>{cell}</td>");
-    }
-    let reference = escape(&s.reference);
-    let _ =
-        write!(body, "<td>{:.1} mm²<span class='span'>{reference}</span></td></tr>", s.reference_area_mm2);
+    row(body, &s.name, &LESION, &cells);
 }
 
 fn or_not_named(text: &str) -> &str {
@@ -162,7 +183,7 @@ fn surface(body: &mut String, uri: Option<&str>) {
     let Some(uri) = uri else { return };
     let _ = write!(
         body,
-        "<h2>Lumen</h2><figure><img alt='the lumen surface from two sides' src='{uri}'><figcaption>The lumen's surface, \
+        "<h2>Lumen</h2><figure class='wide'><div><img alt='the lumen surface from two sides' src='{uri}'></div><figcaption>The lumen's surface, \
          proximal end left. L, R, A, P, F: toward the patient's left, right, front, back, feet.</figcaption></figure>"
     );
 }
@@ -170,7 +191,7 @@ fn surface(body: &mut String, uri: Option<&str>) {
 fn area(body: &mut String, pictures: &Pictures) {
     let _ = write!(
         body,
-        "<h2>Lumen area</h2><figure>{}<figcaption>Area of the sections normal to the centreline; the band is the 95 % \
+        "<h2>Lumen area</h2><figure class='wide'><div>{}</div><figcaption>Area of the sections normal to the centreline; the band is the 95 % \
          interval, shaded columns the extent of each stenosis. Where the line is broken, nothing was measured.</figcaption>\
          </figure>",
         pictures.area_curve
@@ -181,26 +202,22 @@ fn segments(body: &mut String, report: &Report) {
     if report.segments.is_empty() {
         return;
     }
-    body.push_str(
-        "<h2>Segments</h2><table><thead><tr><th>Segment</th><th>From</th><th>To</th><th>Mean area</th>\
-         <th>Mean diameter</th><th>Smallest area</th><th>Force</th><th>Worst stenosis</th></tr></thead><tbody>",
-    );
+    body.push_str("<h2>Segments</h2><table class='rows'><thead><tr><th></th>");
+    for name in SEGMENT {
+        let _ = write!(body, "<th>{name}</th>");
+    }
+    body.push_str("</tr></thead><tbody>");
     for s in &report.segments {
-        let worst = s.worst_percent_area.map_or_else(|| "none".to_owned(), |p| format!("{p:.1} % of area"));
-        let force = s.mean_force_n.map_or_else(|| "not measured".to_owned(), |n| format!("{n:.1} N"));
-        let _ = write!(
-            body,
-            "<tr><th>{}</th><td class='n'>{:.0} mm</td><td class='n'>{:.0} mm</td><td class='n'>{:.1} mm²{}</td>\
-             <td class='n'>{:.2} mm</td><td class='n'>{:.1} mm²{}</td><td class='n'>{force}</td><td>{worst}</td></tr>",
-            escape(&s.name),
-            s.from_mm,
-            s.until_mm,
-            s.mean_area_mm2,
-            span(s.mean_area_interval_mm2),
-            s.mean_diameter_mm,
-            s.min_area_mm2,
-            span(s.min_area_interval_mm2)
-        );
+        let cells = [
+            format!("{:.0} mm", s.from_mm),
+            format!("{:.0} mm", s.until_mm),
+            format!("{:.1} mm²{}", s.mean_area_mm2, span(s.mean_area_interval_mm2)),
+            format!("{:.2} mm", s.mean_diameter_mm),
+            format!("{:.1} mm²{}", s.min_area_mm2, span(s.min_area_interval_mm2)),
+            s.mean_force_n.map_or_else(|| "not measured".to_owned(), |n| format!("{n:.1} N")),
+            s.worst_percent_area.map_or_else(|| "none".to_owned(), |p| format!("{p:.1} % of area")),
+        ];
+        row(body, &s.name, &SEGMENT, &cells);
     }
     body.push_str("</tbody></table>");
 }
@@ -295,14 +312,18 @@ header p{margin:0 0 6px;color:var(--soft)}\
 table{border-collapse:collapse;width:100%;font-size:14px}\
 th,td{text-align:left;padding:6px 8px;border-bottom:1px solid var(--line);vertical-align:top}\
 thead th{color:var(--soft);font-weight:600;font-size:13px;line-height:1.3;border-bottom:1px solid var(--soft)}\
-td.n{white-space:nowrap;font-variant-numeric:tabular-nums}\
-.lesions tbody th{color:var(--mark)}.span{display:block;color:var(--soft);font-size:12.5px}\
+.rows td{font-variant-numeric:tabular-nums}.lesions tbody th{color:var(--mark)}\
+.span,.words{display:block;color:var(--soft);font-size:12.5px}.span{white-space:nowrap}.words{min-width:105px;line-height:1.3}\
 .note{color:var(--soft);font-size:13px;margin:6px 0 0}\
 .conditions th{width:190px;font-weight:600;color:var(--soft)}.conditions td{overflow-wrap:anywhere}\
 figure{margin:8px 0}img,svg{max-width:100%;width:100%;height:auto;display:block}figcaption{color:var(--soft);font-size:13px;margin-top:6px}\
 .bscans{display:grid;grid-template-columns:repeat(auto-fit,minmax(260px,1fr));gap:16px}.bscans img{border-radius:2px}\
 footer{margin-top:30px;padding-top:12px;border-top:1px solid var(--line);color:var(--soft);font-size:13px}\
-@media(max-width:700px){main{margin:0;padding:20px}table{display:block;overflow-x:auto}}\
+@media(max-width:700px){main{margin:0;padding:20px}.wide>div{overflow-x:auto}.wide img,.wide svg{width:760px;max-width:none}\
+.rows,.rows tbody,.rows tr,.rows th,.conditions,.conditions tbody,.conditions tr,.conditions th,.conditions td{display:block;width:auto}\
+.rows thead{display:none}.rows tbody th{font-size:16px;padding-top:14px;border-bottom:1px solid var(--soft)}\
+.rows td{display:grid;grid-template-columns:8.5em 1fr;gap:8px}.rows td::before{content:attr(data-is);color:var(--soft)}\
+.conditions th{border:0;padding-bottom:0}.conditions td{padding-top:0}}\
 @media print{body{background:#fff}main{margin:0;padding:0;box-shadow:none;max-width:none}h2,figure,tr{break-inside:avoid}}";
 
 #[cfg(test)]

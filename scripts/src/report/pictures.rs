@@ -1,7 +1,7 @@
 //! The pictures of a report: the surface from two sides with the stenoses marked, the area curve, B-scans with contours.
 
 use nalgebra::Vector3;
-use probepath_recon::{LumenReconstruction, Mesh};
+use probepath_recon::{LumenReconstruction, Mesh, Section, Vessel};
 use probepath_us_capture::PlacedBScan;
 
 use super::StenosisRow;
@@ -36,12 +36,12 @@ pub fn surface(mesh: &Mesh, recon: &LumenReconstruction, rows: &[StenosisRow]) -
         let window = if above { FRONT } else { RIGHT };
         over.text((24.0, window.top - 22.0), words, LETTERS, Anchor::Start, SOFT);
         compass(&mut over, &camera, (44.0, window.top + window.height / 2.0));
-        marks(&mut over, &camera, recon, rows, above);
+        marks(&mut over, &camera, &Marked { recon, rows, vertices_mm: &vertices_mm, above });
     }
     let foot = SIZE.1 as f64 - 62.0;
     length_scale(&mut over, cameras[0].scale, (90.0, foot + 18.0));
     let at = (SIZE.0 as f64 - 90.0 - 420.0, foot);
-    scale.bar(&mut over, at, (420.0, 20.0), "area lost against the open lumen (median), %", LETTERS * 0.84);
+    scale.bar(&mut over, at, (420.0, 20.0), "area lost against the vessel's median, %", LETTERS * 0.84);
     over.paint(&mut picture, 1.0);
     Some(picture)
 }
@@ -54,44 +54,77 @@ fn both(vertices_mm: &[[f64; 3]]) -> Option<[Camera; 2]> {
     Some([front.with_scale(scale), right.with_scale(scale)])
 }
 
-/// How much of the median area is missing at each vertex (%).
+/// How much of its vessel's median area is missing at each vertex (%).
 fn lost_percent(mesh: &Mesh, recon: &LumenReconstruction) -> Option<Vec<f64>> {
     let areas: Vec<f64> = match mesh.scalars("area_mm2") {
         Some(areas) => areas.to_vec(),
         None => mesh.points.iter().map(|p| area_near(recon, p)).collect(),
     };
-    let mut known: Vec<f64> =
-        recon.sections.iter().filter_map(|s| Some(s.measure.as_ref()?.area_mm2)).collect();
+    let first = median(&recon.sections)?;
+    let medians: Vec<f64> = recon.vessels.iter().map(|v| median(&v.sections).unwrap_or(first)).collect();
+    let lost = |(point, area): (&Vector3<f64>, f64)| {
+        let open = vessel_at(recon, point).and_then(|vessel| medians.get(vessel)).unwrap_or(&first);
+        100.0 * (1.0 - area / open)
+    };
+    Some(mesh.points.iter().zip(areas).map(lost).collect())
+}
+
+fn median(sections: &[Section]) -> Option<f64> {
+    let mut known: Vec<f64> = sections.iter().filter_map(|s| Some(s.measure.as_ref()?.area_mm2)).collect();
     known.sort_by(f64::total_cmp);
-    let open = *known.get(known.len() / 2)?;
-    Some(areas.iter().map(|area| 100.0 * (1.0 - area / open)).collect())
+    known.get(known.len() / 2).copied()
+}
+
+/// Which of several vessels a point of the surface belongs to: the one whose wall is nearest.
+fn vessel_at(recon: &LumenReconstruction, point: &Vector3<f64>) -> Option<usize> {
+    if recon.vessels.len() < 2 {
+        return None;
+    }
+    let off = |section: &Section| {
+        let radius = (section.measure.as_ref()?.area_mm2 * 1e-6 / std::f64::consts::PI).sqrt();
+        Some((section.centre.vector() - point).norm() - radius)
+    };
+    // Every millimetre will do.
+    let nearest =
+        |vessel: &Vessel| vessel.sections.iter().step_by(2).filter_map(off).fold(f64::INFINITY, f64::min);
+    let all = recon.vessels.iter().map(nearest).enumerate();
+    all.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(number, _)| number)
 }
 
 fn area_near(recon: &LumenReconstruction, vertex: &Vector3<f64>) -> f64 {
-    let near = |s: &probepath_recon::Section| {
-        Some(((s.centre.vector() - vertex).norm_squared(), s.measure.as_ref()?.area_mm2))
-    };
+    let near =
+        |s: &Section| Some(((s.centre.vector() - vertex).norm_squared(), s.measure.as_ref()?.area_mm2));
     let nearest = recon.sections.iter().filter_map(near).min_by(|a, b| a.0.total_cmp(&b.0));
     nearest.map_or(f64::NAN, |(_, area)| area)
 }
 
-/// A name beside every stenosis, and what it comes to, once.
-fn marks(
-    over: &mut Drawing,
-    camera: &Camera,
-    recon: &LumenReconstruction,
-    rows: &[StenosisRow],
+/// What is written beside the surface.
+struct Marked<'m> {
+    recon: &'m LumenReconstruction,
+    rows: &'m [StenosisRow],
+    vertices_mm: &'m [[f64; 3]],
+    /// Whether what each comes to is said too.
     above: bool,
-) {
-    for row in rows {
-        let Some(at) = recon.centreline.at(row.at_mm * 1e-3) else { continue };
+}
+
+/// A name beside every stenosis, and what it comes to, once.
+fn marks(over: &mut Drawing, camera: &Camera, marked: &Marked<'_>) {
+    let outline: Vec<(f64, f64)> =
+        marked.vertices_mm.iter().map(|v| camera.project(*v)).map(|p| (p.0, p.1)).collect();
+    for row in marked.rows {
+        let Some(at) = marked.recon.centreline.at(row.at_mm * 1e-3) else { continue };
         let (x, y, _) = camera.project((at.point.vector() * 1e3).into());
-        // Outside the vessel, whatever its size.
-        let free = 6.0 * camera.scale + 10.0;
-        over.line(&[(x, y - free - 26.0), (x, y - free)], 2.5, MARK);
-        let label =
-            if above { format!("{}  {:.0} % of area", row.name, row.percent_area) } else { row.name.clone() };
-        over.text((x, y - free - 36.0), &label, LETTERS * 1.1, Anchor::Middle, MARK);
+        let label = if marked.above {
+            format!("{}  {:.0} % of area", row.name, row.percent_area)
+        } else {
+            row.name.clone()
+        };
+        // Above all that is drawn behind the words, a branch too.
+        let half = LETTERS * 0.3 * label.chars().count() as f64;
+        let beside = outline.iter().filter(|p| (p.0 - x).abs() < half).map(|p| p.1);
+        let foot = beside.fold(y, f64::min) - 10.0;
+        over.line(&[(x, foot - 26.0), (x, foot)], 2.5, MARK);
+        over.text((x, foot - 36.0), &label, LETTERS * 1.1, Anchor::Middle, MARK);
     }
 }
 

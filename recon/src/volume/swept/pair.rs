@@ -8,18 +8,14 @@ use probepath_us_capture::PixelMap;
 
 use super::super::clip::Clip;
 use super::super::{Grid, Swept};
-
-/// A place is found to this part of a voxel.
-const CLOSE: f64 = 1e-3;
-/// Newton's steps, each kept inside the bracket; turns between neighbours are small, so one or two do.
-const MOST_STEPS: usize = 12;
+use super::passing::Turning;
 
 /// Where an image's pixels are: `origin + u column + v row`, in voxels.
 #[derive(Clone, Copy, Debug)]
-struct Plane {
-    origin: Vector3<f64>,
-    column: Vector3<f64>,
-    row: Vector3<f64>,
+pub(super) struct Plane {
+    pub(super) origin: Vector3<f64>,
+    pub(super) column: Vector3<f64>,
+    pub(super) row: Vector3<f64>,
 }
 
 /// Two neighbouring images.
@@ -28,10 +24,11 @@ pub(in super::super) struct Pair {
     /// Of the first.
     pub(super) number: usize,
     pub(super) clip: usize,
-    first: Plane,
+    pub(super) first: Plane,
     second: Plane,
-    change: Plane,
+    pub(super) change: Plane,
     normals: [Vector3<f64>; 2],
+    pub(super) turning: Turning,
     /// Voxels that may lie between them.
     voxels: [Range<i64>; 3],
 }
@@ -47,7 +44,7 @@ impl Plane {
         self.origin + self.column * column + self.row * row
     }
 
-    fn along(&self, change: &Self, t: f64) -> Self {
+    pub(super) fn along(&self, change: &Self, t: f64) -> Self {
         let origin = self.origin + change.origin * t;
         Self { origin, column: self.column + change.column * t, row: self.row + change.row * t }
     }
@@ -57,7 +54,7 @@ impl Plane {
     }
 
     /// The pixel whose place is nearest to a point.
-    fn pixel(&self, point: &Vector3<f64>) -> Option<(f64, f64)> {
+    pub(super) fn pixel(&self, point: &Vector3<f64>) -> Option<(f64, f64)> {
         let off = point - self.origin;
         let (cc, rr, cr) =
             (self.column.dot(&self.column), self.row.dot(&self.row), self.column.dot(&self.row));
@@ -102,7 +99,8 @@ impl Pair {
         });
         let inside = voxels.iter().all(|range| !range.is_empty());
         let normals = [first.normal(), second.normal()];
-        inside.then_some(Self { number, clip: own, first, second, change, normals, voxels })
+        let turning = Turning::of(&first, &change);
+        inside.then_some(Self { number, clip: own, first, second, change, normals, turning, voxels })
     }
 
     pub(super) fn touches(&self, layers: &Range<i64>) -> bool {
@@ -110,13 +108,13 @@ impl Pair {
     }
 
     /// The rows of voxels that may lie between the images: y, z, and the range of x.
-    pub(super) fn rows(&self, layers: &Range<i64>, mut work: impl FnMut(i64, i64, Range<usize>)) {
+    pub(super) fn rows(&self, layers: &Range<i64>, mut work: impl FnMut([i64; 2], Range<usize>)) {
         let [x, y, z] = &self.voxels;
         for z in z.start.max(layers.start)..z.end.min(layers.end) {
             for y in y.clone() {
                 let columns = self.columns(x, y as f64, z as f64);
                 if !columns.is_empty() {
-                    work(y, z, columns);
+                    work([y, z], columns);
                 }
             }
         }
@@ -144,44 +142,9 @@ impl Pair {
     }
 
     /// The signed volumes of a row's voxels with the two planes, as offset and slope along x.
-    fn sides(&self, y: f64, z: f64) -> [(f64, f64); 2] {
+    pub(super) fn sides(&self, y: f64, z: f64) -> [(f64, f64); 2] {
         let row = Vector3::new(0.0, y, z);
         let side = |plane: &Plane, normal: &Vector3<f64>| (normal.dot(&(row - plane.origin)), normal.x);
         [side(&self.first, &self.normals[0]), side(&self.second, &self.normals[1])]
-    }
-
-    /// When and as which pixel the images pass a point: t from 0 to 1, column, row.
-    pub(super) fn passing(&self, point: [f64; 3]) -> Option<(f64, f64, f64)> {
-        let point = Vector3::from(point);
-        let before = self.normals[0].dot(&(point - self.first.origin));
-        let after = self.normals[1].dot(&(point - self.second.origin));
-        if before * after > 0.0 {
-            return None;
-        }
-        let (mut low, mut high) = (0.0, 1.0);
-        let mut t = before / (before - after);
-        if !t.is_finite() {
-            // In both planes at once.
-            t = 0.0;
-        }
-        for _ in 0..MOST_STEPS {
-            let plane = self.first.along(&self.change, t);
-            let (normal, off) = (plane.normal(), point - plane.origin);
-            let side = normal.dot(&off);
-            if side * side <= CLOSE * CLOSE * normal.norm_squared() {
-                let (u, v) = plane.pixel(&point)?;
-                return Some((t, u, v));
-            }
-            if side * before > 0.0 {
-                low = t
-            } else {
-                high = t
-            }
-            let turning = self.change.column.cross(&plane.row) + plane.column.cross(&self.change.row);
-            let slope = turning.dot(&off) - normal.dot(&self.change.origin);
-            let next = t - side / slope;
-            t = if next > low && next < high { next } else { 0.5 * (low + high) };
-        }
-        None
     }
 }

@@ -11,6 +11,7 @@ use probepath_us_capture::{BadBScan, BadCalibration, BadPixelMap};
 use thiserror::Error;
 
 use super::FinderFault;
+use crate::offline::in_file;
 use crate::report::build::ReportError;
 
 /// What cannot be reconstructed.
@@ -29,14 +30,37 @@ pub enum ReconstructError {
     #[error(transparent)]
     Exam(#[from] ExamError),
     /// The sequence.
-    #[error(transparent)]
-    Sequence(#[from] SequenceError),
+    #[error("{}", in_file(path, source))]
+    Sequence {
+        /// Its file.
+        path: PathBuf,
+        /// Why.
+        source: SequenceError,
+    },
     /// The PLUS configuration.
     #[error(transparent)]
     Plus(#[from] PlusError),
     /// Our own calibration.
     #[error(transparent)]
     Calibration(#[from] BadCalibration),
+    /// The file of a calibration.
+    #[error("{}", in_file(path, source))]
+    CalibrationFile {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: BadCalibration,
+    },
+    /// A length that is none.
+    #[error("{option} is {found} mm: it has to be {least}")]
+    Length {
+        /// What was asked for.
+        option: &'static str,
+        /// How much (mm).
+        found: f64,
+        /// What it may be.
+        least: &'static str,
+    },
     /// A calibration that places no pixels.
     #[error(transparent)]
     PixelMap(#[from] BadPixelMap),

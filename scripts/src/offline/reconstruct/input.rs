@@ -96,7 +96,8 @@ impl Input {
     pub(super) fn of_sequence(input: &Path, calibration: Option<&Path>) -> Result<Self, ReconstructError> {
         let calibration =
             calibration.ok_or_else(|| ReconstructError::NoCalibration { path: input.into() })?;
-        let sequence = Sequence::read(input, &ReadOptions::default())?;
+        let sequence = Sequence::read(input, &ReadOptions::default())
+            .map_err(|source| ReconstructError::Sequence { path: input.into(), source })?;
         let chain = Chain::of(calibration, input, &sequence)?;
         let total = sequence.images().len();
         let mut notes: Vec<String> = sequence.notes().iter().map(ToString::to_string).collect();
@@ -190,7 +191,7 @@ fn of_that_size(
 }
 
 fn read_own(path: &Path) -> Result<Calibration, ReconstructError> {
-    Ok(Calibration::read(path)?)
+    Calibration::read(path).map_err(|source| ReconstructError::CalibrationFile { path: path.into(), source })
 }
 
 /// Gives the images of an exam their place by another calibration of their setting.

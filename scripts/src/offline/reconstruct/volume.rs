@@ -39,7 +39,20 @@ pub struct VolumeOptions {
 
 impl VolumeOptions {
     /// These settings with what the options say.
-    fn over(&self, usual: &VolumeSettings) -> Result<VolumeSettings, ReconstructError> {
+    ///
+    /// # Errors
+    /// When a length is none, or the table of importance cannot be read.
+    pub(super) fn over(&self, usual: &VolumeSettings) -> Result<VolumeSettings, ReconstructError> {
+        let wrong = |option, found, least| Err(ReconstructError::Length { option, found, least });
+        match (self.voxel_mm, self.fill_mm) {
+            (Some(voxel), _) if !(voxel.is_finite() && voxel > 0.0) => {
+                return wrong("the voxel size (--voxel-mm)", voxel, "more than 0");
+            }
+            (_, Some(fill)) if !(fill.is_finite() && fill >= 0.0) => {
+                return wrong("the distance to fill (--fill-mm)", fill, "0 or more");
+            }
+            _ => {}
+        }
         let mut settings = usual.clone();
         if let Some(voxel_mm) = self.voxel_mm {
             settings.spacing_m = [voxel_mm * 1e-3; 3];
@@ -87,16 +100,18 @@ pub struct VolumeMade {
 /// Builds a volume and writes it into the folder.
 pub(super) fn build(
     slices: &[Slice<'_>],
-    usual: &VolumeSettings,
+    settings: &VolumeSettings,
     options: &VolumeOptions,
     out: &Path,
 ) -> Result<VolumeMade, ReconstructError> {
-    let tiles = Tiles::new(slices, &options.over(usual)?)?;
+    let tiles = Tiles::new(slices, settings)?;
     let (grid, memory_mb) = (tiles.grid().clone(), tiles.memory_bytes() as f64 / 1e6);
     fits_the_disk(grid.size, options.disk_mb.unwrap_or(DISK_MB))?;
     let ending = if options.nrrd { "nrrd" } else { "mha" };
     let [file, marks] = ["volume", "volume-marks"].map(|name| out.join(name).with_extension(ending));
-    let Written { seen, filled, parts } = tiles.write(&file, &marks, |_| ())?;
+    let Written { seen, filled, parts } = tiles
+        .write(&file, &marks, |_| ())
+        .map_err(|source| ReconstructError::Sequence { path: file.clone(), source })?;
     let spacing_mm = grid.spacing_m.map(|s| s * 1e3);
     Ok(VolumeMade { file, marks, size: grid.size, spacing_mm, seen, filled, parts, memory_mb })
 }
@@ -164,7 +179,7 @@ mod tests {
             disk_mb: None,
             nrrd: true,
         };
-        let whole = build(&slices, &usual, &options, &folder).unwrap();
+        let whole = build(&slices, &options.over(&usual).unwrap(), &options, &folder).unwrap();
         let grey = Volume::read(&whole.file, 1 << 30).unwrap();
         assert!(whole.parts == 1 && whole.filled > 0 && (whole.spacing_mm[0] - 0.25).abs() < 1e-12);
         assert_eq!((grey.grid().size, whole.file.extension().unwrap().to_str()), (whole.size, Some("nrrd")));
@@ -172,14 +187,31 @@ mod tests {
         assert_eq!(grey.at([2, 4, 0]), Some(0));
         let needs = whole.memory_mb;
         let small = VolumeOptions { memory_mb: Some((needs * 0.7) as u64 + 1), nrrd: false, ..options };
-        let parts = build(&slices, &usual, &small, &folder).unwrap();
+        let parts = build(&slices, &small.over(&usual).unwrap(), &small, &folder).unwrap();
         assert!(parts.memory_mb <= small.memory_mb.unwrap() as f64, "{parts}");
         assert!(Volume::read(&parts.file, 1 << 30).unwrap().grey() == grey.grey());
         std::fs::write(&table, "columns = 2\nrows = 1\n").unwrap();
-        let refused = build(&slices, &usual, &small, &folder).unwrap_err();
+        let refused = small.over(&usual).unwrap_err();
         assert!(refused.to_string().contains("importance.toml"), "{refused}");
         let none = VolumeOptions { memory_mb: Some(0), ..VolumeOptions::default() };
-        assert!(matches!(build(&slices, &usual, &none, &folder), Err(ReconstructError::Volume(_))));
+        assert!(matches!(
+            build(&slices, &none.over(&usual).unwrap(), &none, &folder),
+            Err(ReconstructError::Volume(_))
+        ));
         std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn a_length_that_is_none_is_refused_by_its_option() {
+        let usual = VolumeSettings::every_mm(VOXEL_MM);
+        for wrong in [0.0, -0.5, f64::NAN, f64::INFINITY] {
+            let options = VolumeOptions { voxel_mm: Some(wrong), ..VolumeOptions::default() };
+            let text = options.over(&usual).unwrap_err().to_string();
+            assert!(text.contains("--voxel-mm") && text.contains("more than 0"), "{text}");
+        }
+        for wrong in [-0.1, f64::NAN] {
+            let options = VolumeOptions { fill_mm: Some(wrong), ..VolumeOptions::default() };
+            assert!(options.over(&usual).unwrap_err().to_string().contains("--fill-mm"));
+        }
     }
 }
