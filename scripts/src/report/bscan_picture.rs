@@ -9,6 +9,7 @@ const WIDTH: usize = 640;
 /// A yellow that stands off every grey, for any colour vision.
 const CONTOUR: Colour = [255, 214, 10];
 const SCALE: Colour = [235, 240, 245];
+const SHADE: Colour = [12, 16, 22];
 const LETTERS: f64 = 17.0;
 
 /// Draws a B-scan; `contour` is in its pixels, column and row.
@@ -62,10 +63,16 @@ fn depth_scale(picture: &mut Picture, bscan: &BScan) {
     let last = ((setting.window_top_m + shown) * 100.0) as i64;
     for centimetre in first..=last {
         let y = (centimetre as f64 * 0.01 - setting.window_top_m) * per_metre;
+        // Dark round it: pictures are bright, too.
+        picture.stroke(&[(0.0, y), (10.0, y)], 4.5, SHADE);
         picture.stroke(&[(0.0, y), (9.0, y)], 2.0, SCALE);
         let words = if centimetre == last { format!("{centimetre} cm") } else { centimetre.to_string() };
         if y > LETTERS && y < picture.height() as f64 - 3.0 {
-            picture.write((14.0, y + LETTERS * 0.35), &words, LETTERS, Anchor::Start, SCALE);
+            let (x, y) = (14.0, y + LETTERS * 0.35);
+            for (right, down) in [(-1.3, 0.0), (1.3, 0.0), (0.0, -1.3), (0.0, 1.3), (0.9, 0.9), (-0.9, 0.9)] {
+                picture.write((x + right, y + down), &words, LETTERS, Anchor::Start, SHADE);
+            }
+            picture.write((x, y), &words, LETTERS, Anchor::Start, SCALE);
         }
     }
 }

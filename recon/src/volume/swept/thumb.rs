@@ -39,8 +39,9 @@ fn block(slice: &Slice<'_>, grid: &Grid) -> [usize; 2] {
 /// What the means of an image take.
 pub(super) fn bytes(slice: &Slice<'_>, grid: &Grid) -> u64 {
     let [across, down] = block(slice, grid);
-    let cells = (slice.width.div_ceil(across) as u64 + 1) * (slice.height().div_ceil(down) as u64 + 1);
-    cells * size_of::<u16>() as u64
+    let (columns, rows) = (slice.width.div_ceil(across) as u64, slice.height().div_ceil(down) as u64);
+    let cells = columns.saturating_add(1).saturating_mul(rows.saturating_add(1));
+    cells.saturating_mul(size_of::<u16>() as u64)
 }
 
 impl Thumb {
@@ -75,7 +76,12 @@ impl Thumb {
         let cells = blocks.map(|[sum, count]| mean(*sum, *count)).collect();
         let one = f64::from(1 << PART);
         let last = [columns, rows].map(|blocks| blocks.saturating_sub(1) as f64 * one);
-        Self { cells, stride: columns + 1, last, scale: [across, down].map(|pixels| one / pixels as f64) }
+        Self {
+            cells,
+            stride: columns.saturating_add(1),
+            last,
+            scale: [across, down].map(|pixels| one / pixels as f64),
+        }
     }
 
     /// Whether a place is the same spot in both.
