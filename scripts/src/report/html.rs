@@ -313,7 +313,7 @@ table{border-collapse:collapse;width:100%;font-size:14px}\
 th,td{text-align:left;padding:6px 8px;border-bottom:1px solid var(--line);vertical-align:top}\
 thead th{color:var(--soft);font-weight:600;font-size:13px;line-height:1.3;border-bottom:1px solid var(--soft)}\
 .rows td{font-variant-numeric:tabular-nums}.lesions tbody th{color:var(--mark)}\
-.span,.words{display:block;color:var(--soft);font-size:12.5px}.span{white-space:nowrap}.words{min-width:105px;line-height:1.3}\
+.span,.words{display:block;color:var(--soft);font-size:12.5px}.span{white-space:nowrap}.words{min-width:92px;line-height:1.3}\
 .note{color:var(--soft);font-size:13px;margin:6px 0 0}\
 .conditions th{width:190px;font-weight:600;color:var(--soft)}.conditions td{overflow-wrap:anywhere}\
 figure{margin:8px 0}img,svg{max-width:100%;width:100%;height:auto;display:block}figcaption{color:var(--soft);font-size:13px;margin-top:6px}\
