@@ -105,6 +105,17 @@ fn without_a_lumen_in_any_image_there_is_no_surface_and_the_reason_is_said() {
 }
 
 #[test]
+fn a_seed_outside_of_the_pictures_is_refused() {
+    let (out, wish) = wish("seed", &sequence(|number, pose, pixels| (number < 4).then_some((pose, pixels))));
+    for place in [(1000.0, 3.0), (-1.0, 3.0), (3.0, 500.0)] {
+        let wish = ReconstructWish { seed_mm: Some(place), ..wish.clone() };
+        let error = reconstruct(&wish, &()).unwrap_err().to_string();
+        assert!(error.contains("--seed-mm") && error.contains("outside"), "{error}");
+    }
+    fs::remove_dir_all(out).unwrap();
+}
+
+#[test]
 fn one_image_is_not_enough() {
     let error = refused("one", &sequence(|number, pose, pixels| (number == 3).then_some((pose, pixels))));
     assert!(error.contains("1 images") && error.contains("at least"), "{error}");

@@ -136,7 +136,7 @@ pub fn reconstruct(
     let (begun, mut timing) = (now(), Timing::default());
     progress.at("reading", 0.0);
     let mut input = timed(&mut timing.reading, || read(wish))?;
-    input.lumen.seed = wish.seed_mm.map(|(x_mm, y_mm)| SeedPoint::Millimetres { x_mm, y_mm });
+    input.lumen.seed = wish.seed_mm.map(|place| seed(place, &input)).transpose()?;
     let settings = wish.volume.then(|| wish.volume_options.over(&input.volume)).transpose()?;
     progress.at("looking for the lumen", 0.2);
     let found = lumen(wish, &input, &mut timing);
@@ -162,6 +162,18 @@ pub fn reconstruct(
     made.peak_memory_mb = peak_memory_mb();
     made.timing_s = timing;
     Ok(made)
+}
+
+/// A place in the lumen, when it lies in the pictures.
+fn seed((x_mm, y_mm): (f64, f64), input: &Input) -> Result<SeedPoint, ReconstructError> {
+    if let Some(bscan) = input.images.first().map(|image| &image.bscan) {
+        let spacing = bscan.setting.spacing;
+        let size_mm = (bscan.width() as f64 * spacing.x_m * 1e3, bscan.height() as f64 * spacing.y_m * 1e3);
+        if !((0.0..=size_mm.0).contains(&x_mm) && (0.0..=size_mm.1).contains(&y_mm)) {
+            return Err(ReconstructError::Seed { x_mm, y_mm, size_mm });
+        }
+    }
+    Ok(SeedPoint::Millimetres { x_mm, y_mm })
 }
 
 /// What the clock on the wall says.

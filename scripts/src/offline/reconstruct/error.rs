@@ -51,6 +51,19 @@ pub enum ReconstructError {
         /// Why.
         source: BadCalibration,
     },
+    /// A seed that no picture has.
+    #[error(
+        "the seed at {x_mm}, {y_mm} mm lies outside of the pictures, which are {:.1} x {:.1} mm (--seed-mm, right of the \
+         first column and below the first row)", size_mm.0, size_mm.1
+    )]
+    Seed {
+        /// Right of the first column (mm).
+        x_mm: f64,
+        /// Below the first row (mm).
+        y_mm: f64,
+        /// Width and height of the pictures (mm).
+        size_mm: (f64, f64),
+    },
     /// A length that is none.
     #[error("{option} is {found} mm: it has to be {least}")]
     Length {
