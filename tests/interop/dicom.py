@@ -25,6 +25,8 @@ warnings.simplefilter("error")
 STANDARD = Path(highdicom.__file__).parent / "_standard"
 # A module that a kind of file may do without, and that these files hold all the same.
 HELD = {"us-region-calibration"}
+# What an item of a report's tree must have depends on its kind, which the tables do not say: `report` looks at the tree.
+BY_KIND = {"sr-document-content"}
 
 
 def need(condition, what):
@@ -37,7 +39,8 @@ def tables(sop_class):
     name = json.loads((STANDARD / "sop_class_iod_map.json").read_text())[sop_class]
     modules = json.loads((STANDARD / "iod_module_map.json").read_text())[name]
     attributes = json.loads((STANDARD / "module_attribute_map.json").read_text())
-    due = [a for m in modules if m["usage"] == "M" or m["key"] in HELD for a in attributes[m["key"]]]
+    held = [m["key"] for m in modules if (m["usage"] == "M" or m["key"] in HELD) and m["key"] not in BY_KIND]
+    due = [attribute for key in held for attribute in attributes[key]]
     known = {(*a["path"], a["keyword"]) for m in modules for a in attributes[m["key"]]}
     return name, due, known
 
@@ -112,6 +115,8 @@ def report(path):
         warnings.simplefilter("default")
         document = highdicom.sr.srread(path)
     need(type(document).__name__ == "Comprehensive3DSR", f"highdicom reads a {type(document).__name__}")
+    for name in ("ValueType", "ConceptNameCodeSequence", "ContinuityOfContent", "ContentSequence"):
+        need(data.get(name), f"structured report: {name} is missing or empty")
     numbers = {}
 
     def walk(items, inside):
