@@ -10,6 +10,7 @@ mod refusal;
 mod region;
 mod seed;
 mod track;
+mod wall;
 
 use probepath_frames::{Point, World};
 use probepath_us_capture::PlacedBScan;
@@ -26,6 +27,7 @@ use crate::{LumenSettings, SeedPoint};
 use contour::Uncertainty;
 use fit::{Border, FitInput, Plane};
 use region::{RAYS, Region, angle};
+use wall::{WallPrior, Walls};
 
 /// What one image gave.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,11 +46,15 @@ pub struct ImageLumen {
 /// The settings and images are taken as they are: [`reconstruct_lumen`](crate::reconstruct_lumen) checks them.
 pub fn segment(images: &[PlacedBScan], settings: &LumenSettings) -> Vec<ImageLumen> {
     let table = PowerOfGrey::new(settings.dynamic_range_db);
-    let look = Look { table: &table, settings };
+    let look = Look { table: &table, settings, wall: WallPrior::unknown(settings.wall_thickness_m) };
     let mut regions = track::follow(images, &table, settings);
     let mut borders = first_borders(images, &regions, &look);
     again::second_look(images, &look, &mut regions, &mut borders);
-    for _ in 0..PASSES {
+    for pass in 0..PASSES {
+        // Before the beam's thickness is thought of, walls that run aslant look thick.
+        let wall =
+            if pass > 0 { wall_of(images, &borders).prior(settings.wall_thickness_m) } else { look.wall };
+        let look = Look { wall, ..look };
         let planes = beam::planes(images, &borders, &settings.point_spread);
         let inputs = images.par_iter().zip(&regions).zip(&planes);
         borders = inputs
@@ -71,6 +77,18 @@ pub fn segment(images: &[PlacedBScan], settings: &LumenSettings) -> Vec<ImageLum
     let mut lumens: Vec<ImageLumen> = lumens.collect();
     branches::in_sweep(images, &look, &mut lumens);
     lumens
+}
+
+/// What all images say of the wall.
+fn wall_of(images: &[PlacedBScan], borders: &[Result<Border, NoLumen>]) -> Walls {
+    let mut walls = Walls::default();
+    for (image, border) in images.iter().zip(borders) {
+        if let Ok(border) = border {
+            let centre = image.world_from_image * Point::new(border.centre.0, border.centre.1, 0.0);
+            walls.add(border, centre.vector());
+        }
+    }
+    walls
 }
 
 /// Images that are fitted one after the other, each from where the one before ended.
@@ -107,12 +125,14 @@ fn first_borders(
 }
 
 /// How often the wall is fitted again with what the neighbouring images say about the beam's thickness.
-const PASSES: usize = 1;
+const PASSES: usize = 2;
 
 /// What every fit needs.
+#[derive(Clone, Copy)]
 struct Look<'a> {
     table: &'a PowerOfGrey,
     settings: &'a LumenSettings,
+    wall: WallPrior,
 }
 
 impl Look<'_> {
@@ -134,7 +154,7 @@ impl Look<'_> {
         let depth = setting.window_top_m + region.centre.1;
         let spread = &self.settings.point_spread;
         let sigma = (spread.lateral_m(depth, setting) / FWHM, spread.axial_fwhm_m / FWHM);
-        let (wall, sigma_sd) = (self.settings.wall_thickness_m, self.settings.point_spread_sd);
+        let (wall, sigma_sd) = (self.wall, self.settings.point_spread_sd);
         let (bscan, table) = (&image.bscan, self.table);
         fit::fit(&FitInput { bscan, table, region, sigma, sigma_sd, wall, planes, earlier })
     }

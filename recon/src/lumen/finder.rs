@@ -9,6 +9,7 @@ use probepath_us_capture::PlacedBScan;
 use super::beam::{self, Section};
 use super::branches::Branches;
 use super::region::Region;
+use super::wall::{WallPrior, Walls};
 use super::{Border, Contour, ImageLumen, Look, NoLumen, Plane, track};
 use crate::LumenSettings;
 use crate::patch::PowerOfGrey;
@@ -65,7 +66,8 @@ impl Tracker {
 
 impl LumenFinder for Tracker {
     fn find(&mut self, image: &PlacedBScan) -> ImageLumen {
-        let look = Look { table: &self.table, settings: &self.settings };
+        let wall = WallPrior::unknown(self.settings.wall_thickness_m);
+        let look = Look { table: &self.table, settings: &self.settings, wall };
         let given = self.settings.seed.filter(|_| self.first).map(|seed| seed.place(image));
         self.first = false;
         let region = track::region(image, &self.table, &self.settings, &self.main.trail, given);
@@ -88,6 +90,7 @@ pub(super) struct Followed {
     pub(super) trail: Vec<Vector3<f64>>,
     sections: VecDeque<Section>,
     last: Option<Border>,
+    walls: Walls,
 }
 
 impl Followed {
@@ -98,6 +101,7 @@ impl Followed {
         region: &Region,
         look: &Look<'_>,
     ) -> Result<Contour, NoLumen> {
+        let look = &Look { wall: self.walls.prior(look.settings.wall_thickness_m), ..*look };
         let centre = image.world_from_image * Point::new(region.centre.0, region.centre.1, 0.0);
         let beside = |section: &&Section| (section.centre - centre.vector()).norm() < BESIDE_M;
         let found = match (self.sections.front().filter(beside), &self.last) {
@@ -132,6 +136,7 @@ impl Followed {
         if self.trail.last().is_none_or(moved) {
             self.trail.push(section.centre);
         }
+        self.walls.add(&border, section.centre);
         self.sections.push_front(section);
         self.sections.truncate(REMEMBERED);
         self.last = Some(border);

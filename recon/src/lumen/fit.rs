@@ -22,6 +22,7 @@ use probepath_us_capture::BScan;
 
 use super::NoLumen;
 use super::region::{RAYS, Region, angle};
+use super::wall::{Told, WallPrior};
 use crate::patch::PowerOfGrey;
 use equations::{GainStep, Gains, Matrix, RADIUS, Residual, SPANS, UNKNOWNS, Vector, Weights, equations};
 use fields::{BY_THICKNESS, Fields, LUMEN, Scene, TISSUE, WALL};
@@ -66,8 +67,8 @@ pub(crate) struct FitInput<'a> {
     /// of themselves.
     pub(crate) sigma: (f64, f64),
     pub(crate) sigma_sd: f64,
-    /// What the wall's thickness is likely to be (m).
-    pub(crate) wall: f64,
+    /// What the wall's thickness is likely to be.
+    pub(crate) wall: WallPrior,
     /// What the beam's thickness takes in.
     pub(crate) planes: &'a [Plane],
     /// A fit of the same lumen to go on from: in this image, or the one beside it.
@@ -108,8 +109,9 @@ pub(crate) struct Border {
     /// Mean square of how far cells are off the prediction, in standard deviations: about one where a wall round a
     /// lumen is what the picture shows.
     pub(crate) misfit: f64,
-    /// Wall's thickness (m).
+    /// Wall's thickness (m), and what the image says of it.
     pub(crate) wall: f64,
+    pub(crate) told: Told,
     /// How much brighter than the lumen the wall is (dB).
     pub(crate) contrast_db: f64,
 }
@@ -206,7 +208,7 @@ impl<'a> Model<'a> {
             let off = sight.farther_out(|bin| front_to_wall(input, direction(bin)));
             start.iter_mut().for_each(|r| *r += off.clamp(-LARGEST_STEP_M, FARTHEST_OUT_M));
         }
-        lattice.limit(|bin| start[bin] + input.wall + BEYOND_M);
+        lattice.limit(|bin| start[bin] + input.wall.thickness_m + BEYOND_M);
         let (prior, prior_sd) = prior(input, &lattice, &start, &sight);
         Ok(Self {
             steps: Steps::new(input.planes, lattice.cell),
@@ -269,6 +271,7 @@ impl<'a> Model<'a> {
         let own = equations::noise(&self.lattice, &mut self.fields.clone(), &self.weights, self.input.sigma);
         let (random, common) = self.covariances(&inverse, own);
         self.unknowns += self.bias(&inverse, &random);
+        let variance = inverse[(THICKNESS, THICKNESS)];
         let wall_db = 10.0 / std::f64::consts::LN_10 * (self.unknowns[SHADES] - self.unknowns[BLOOD]);
         let border = Border {
             centre: self.input.region.centre,
@@ -280,6 +283,7 @@ impl<'a> Model<'a> {
             walled: self.sight.walled,
             misfit,
             wall: self.unknowns[THICKNESS].exp(),
+            told: Told::apart_from(&self.input.wall, self.unknowns[THICKNESS], variance),
             contrast_db: wall_db,
         };
         let sound = border.sd.is_finite() && self.unknowns.iter().all(|x| x.is_finite());
@@ -295,6 +299,10 @@ impl<'a> Model<'a> {
             let of = if k < BORDER { &mut own } else { &mut shared };
             of[(k, k)] += self.prior_sd[k].powi(-2);
         }
+        // Of the wall's thickness a part is the image's own.
+        let alone = (self.input.wall.own_sd / self.input.wall.sd()).powi(2) * shared[(THICKNESS, THICKNESS)];
+        own[(THICKNESS, THICKNESS)] += alone;
+        shared[(THICKNESS, THICKNESS)] -= alone;
         let border = |middle: Matrix| -> Harmonics {
             (inverse * middle * inverse).fixed_view::<BORDER, BORDER>(0, 0).into_owned()
         };
@@ -339,7 +347,7 @@ fn mean_square(square: impl Fn(usize) -> f64) -> f64 {
 /// The cells round the lumen, far enough for the point spread to reach in.
 fn lattice(input: &FitInput<'_>, start: &[f64; BINS], sigma: (f64, f64)) -> Result<Lattice, NoLumen> {
     let farther = if input.earlier.is_none() { FARTHEST_OUT_M } else { 0.0 };
-    let far = start.iter().copied().fold(0.0, f64::max) + farther + input.wall + BEYOND_M;
+    let far = start.iter().copied().fold(0.0, f64::max) + farther + input.wall.thickness_m + BEYOND_M;
     let wanted = Wanted {
         centre: input.region.centre,
         half: (far + 3.5 * sigma.0, far + 3.5 * sigma.1),
@@ -375,14 +383,15 @@ fn prior(input: &FitInput<'_>, lattice: &Lattice, start: &[f64; BINS], sight: &S
     for k in 2..=HARMONICS {
         sd.rows_mut(RADIUS + 2 * k - 1, 2).fill(1.6e-3 / (k * k) as f64);
     }
+    let wall = input.wall.thickness_m;
     let mean = |from: f64, to: f64| lattice.mean(|bin| (start[bin] + from, start[bin] + to)).ln();
-    prior[SHADES] = mean(0.0, input.wall);
+    prior[SHADES] = mean(0.0, wall);
     sd.rows_mut(SHADES + 1, SHADE - 1).fill(0.5);
-    prior[TISSUES] = mean(input.wall + 0.5e-3, input.wall + 1.5e-3);
+    prior[TISSUES] = mean(wall + 0.5e-3, wall + 1.5e-3);
     sd.rows_mut(TISSUES + 1, SHADE - 1).fill(0.5);
     prior[BLOOD] = lattice.mean(|bin| (-1.0, 0.4 * start[bin])).ln();
-    prior[THICKNESS] = input.wall.ln();
-    sd[THICKNESS] = 0.5;
+    prior[THICKNESS] = wall.ln();
+    sd[THICKNESS] = input.wall.sd();
     (prior, sd)
 }
 

@@ -14,6 +14,9 @@ pub struct SectionError {
     pub true_mm2: f64,
     /// Found area (mm²).
     pub found_mm2: f64,
+    /// Its stated standard deviations: of its own, and shared by the scan (mm²).
+    #[serde(default)]
+    pub sd_mm2: [f64; 2],
     /// Whether its 95 % interval holds the true one.
     pub held: bool,
     /// Distance of the found centreline from the true one (mm).
@@ -33,7 +36,8 @@ pub(super) fn sections(vessels: &[Vessel], recon: &LumenReconstruction) -> Vec<S
         let true_mm2 = main.area(at) * 1e6;
         let centre_mm = main.centre(at).distance(&section.centre) * 1e3;
         let held = holds(measure, true_mm2);
-        Some(SectionError { true_mm2, found_mm2: measure.area_mm2, held, centre_mm })
+        let (found_mm2, sd_mm2) = (measure.area_mm2, [measure.area_sd_mm2, measure.area_common_sd_mm2]);
+        Some(SectionError { true_mm2, found_mm2, sd_mm2, held, centre_mm })
     };
     recon.sections.iter().filter_map(beside).collect()
 }

@@ -114,6 +114,7 @@ mod tests {
         let section = |i: usize| SectionError {
             true_mm2: 48.0,
             found_mm2: 48.5,
+            sd_mm2: [0.5, 0.5],
             held: !i.is_multiple_of(20),
             centre_mm: 0.1,
         };
