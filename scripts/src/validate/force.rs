@@ -8,7 +8,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use probepath_robot::Operator;
-use probepath_sim::DisturbanceConfig;
+use probepath_sim::{DisturbanceConfig, SkinConfig};
 
 use super::bench::{Folder, taught, tell};
 use super::{Goal, Goals, ValidateError};
@@ -45,7 +45,10 @@ pub fn force(seeds: u64, progress: &dyn Progress) -> Result<Goals, ValidateError
     let bench = Bench { seeds, folder: folder.path(), progress };
     let mut rows = bench.undisturbed()?;
     for (name, disturbance) in disturbances() {
-        rows.extend(bench.disturbed(name, &disturbance)?);
+        for (skin, config) in skins() {
+            let disturbed = Skin { disturbance: disturbance.clone(), config };
+            rows.extend(bench.disturbed(&format!("{name}, skin of {skin}"), &disturbed)?);
+        }
     }
     Ok(Goals::new("force: 5 N along the leg at 10 and 20 mm/s, skin of 0.3 to 3 N/mm", seeds, rows))
 }
@@ -61,6 +64,25 @@ fn disturbances() -> [(&'static str, DisturbanceConfig); 5] {
     ]
 }
 
+/// The leg's own skin, and the softest and the hardest of it everywhere: a disturbance falls where it falls, and on these
+/// it falls on the worst place.
+fn skins() -> [(&'static str, SkinConfig); 3] {
+    let even = |n_mm| SkinConfig { softest_n_mm: n_mm, hardest_n_mm: n_mm, ..SkinConfig::default() };
+    let SkinConfig { softest_n_mm, hardest_n_mm, .. } = SkinConfig::default();
+    [
+        ("0.3 to 3 N/mm", SkinConfig::default()),
+        ("0.3 N/mm", even(softest_n_mm)),
+        ("3 N/mm", even(hardest_n_mm)),
+    ]
+}
+
+/// What is under the probe.
+#[derive(Clone, Debug, Default)]
+struct Skin {
+    config: SkinConfig,
+    disturbance: DisturbanceConfig,
+}
+
 /// Where and how often.
 struct Bench<'a> {
     seeds: u64,
@@ -74,7 +96,7 @@ impl Bench<'_> {
         let (mut rows, mut overshoot, mut steady) = (Vec::new(), Vec::new(), Vec::new());
         for speed_m_s in SPEEDS {
             let mm_s = speed_m_s * 1e3;
-            let held = self.all("at rest", speed_m_s, &DisturbanceConfig::default())?;
+            let held = self.all("at rest", speed_m_s, &Skin::default())?;
             let of = |pick: fn(&Held) -> f64| held.iter().map(pick).collect::<Vec<_>>();
             rows.push(Goal::of(
                 format!("true force at {mm_s:.0} mm/s, RMS error, N"),
@@ -103,11 +125,11 @@ impl Bench<'_> {
     }
 
     /// The leg under one disturbance, which begins when the path has been taught.
-    fn disturbed(&self, name: &str, disturbance: &DisturbanceConfig) -> Result<Vec<Goal>, ValidateError> {
+    fn disturbed(&self, name: &str, skin: &Skin) -> Result<Vec<Goal>, ValidateError> {
         let mut rows = Vec::new();
         for speed_m_s in SPEEDS {
             let mm_s = speed_m_s * 1e3;
-            let held = self.all(name, speed_m_s, disturbance)?;
+            let held = self.all(name, speed_m_s, skin)?;
             let rms: Vec<_> = held.iter().map(|held| held.truth.rms_n).collect();
             let most: Vec<_> = held.iter().map(|held| held.truth.most_n).collect();
             rows.push(Goal::of(
@@ -126,29 +148,26 @@ impl Bench<'_> {
         Ok(rows)
     }
 
-    fn all(
-        &self,
-        name: &str,
-        speed_m_s: f64,
-        disturbance: &DisturbanceConfig,
-    ) -> Result<Vec<Held>, ValidateError> {
+    fn all(&self, name: &str, speed_m_s: f64, skin: &Skin) -> Result<Vec<Held>, ValidateError> {
         let what = format!("force, {name}, {:.0} mm/s", speed_m_s * 1e3);
         let one = |seed| {
             tell(self.progress, &what, seed - 1, self.seeds);
-            self.one(seed, speed_m_s, disturbance)
+            self.one(seed, speed_m_s, skin)
         };
         (1..=self.seeds).map(one).collect()
     }
 
     /// One seed: taught at rest, then disturbed and scanned; half way, undisturbed, the probe stands still for a while.
-    fn one(&self, seed: u64, speed_m_s: f64, disturbance: &DisturbanceConfig) -> Result<Held, ValidateError> {
+    fn one(&self, seed: u64, speed_m_s: f64, skin: &Skin) -> Result<Held, ValidateError> {
         let wrong = |source: SessionError| ValidateError::Session { seed, source };
         let operator = Operator::new();
-        let at_rest = *disturbance == DisturbanceConfig::default();
+        let at_rest = skin.disturbance == DisturbanceConfig::default();
         let stand: Arc<dyn Progress> =
             if at_rest { Arc::new(Stand::new(operator.clone())) } else { Arc::new(()) };
-        let (mut session, path) = taught(&CellFile::default(), seed, self.folder, (operator, stand))?;
-        session.disturb(disturbance).map_err(wrong)?;
+        let mut cell = CellFile::default();
+        cell.simulated.skin = skin.config.clone();
+        let (mut session, path) = taught(&cell, seed, self.folder, (operator, stand))?;
+        session.disturb(&skin.disturbance).map_err(wrong)?;
         let wish = ScanWish { look: false, speed_m_s, ..ScanWish::default() };
         let scan = session.scan(&path, &wish).map_err(wrong)?;
         let truth = session.true_contact(&scan).ok_or(wrong(SessionError::Order("nothing was followed")))?;
