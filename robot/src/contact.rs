@@ -14,6 +14,7 @@
 //! skin more energy than it may, it is calmed down ([`tank`]). The argument and the numbers are in `docs/contact.md`.
 
 mod arm_lag;
+mod patience;
 pub(crate) mod pressure;
 mod settings;
 mod stiffness;
@@ -23,6 +24,7 @@ use probepath_frames::Span;
 
 use crate::limits::axis::{self, Bounds, Motion};
 use arm_lag::ArmLag;
+pub use patience::Patience;
 pub use settings::{ContactError, ContactSettings};
 pub use stiffness::SkinEstimate;
 use stiffness::Stiffness;
@@ -38,6 +40,9 @@ const ON_SKIN_N: f64 = 0.4;
 const ASKED_ABOVE: f64 = 1.0;
 /// How much slower, and softer, the law is while the tank is empty.
 const CALM: f64 = 0.5;
+
+/// The part of its speed that the law keeps however fast the path is followed.
+const LEFT_TO_THE_LAW: f64 = 0.25;
 
 /// How long the law stays slower after the jerk was at its limit (s), and how slow it may become.
 const EASED_FOR_S: f64 = 0.1;
@@ -118,6 +123,14 @@ impl ContactLaw {
         self.toward_goal();
         self.arm.command(self.motion.position);
         self.motion.position
+    }
+
+    /// From now on the law goes no faster than a path that is followed at this speed (m/s) leaves it of the speed that
+    /// both have together; a quarter of its own is always left.
+    pub fn beside(&mut self, path_speed_m_s: f64) {
+        let s = &self.settings;
+        let left = s.together_m_s - path_speed_m_s;
+        self.bounds.velocity = left.max(LEFT_TO_THE_LAW * s.speed_m_s).min(s.speed_m_s) * self.dt;
     }
 
     /// One tick at a given speed (m/s, positive into the tissue) instead of a force, as smoothly: the descent before

@@ -62,7 +62,7 @@ mod tool;
 pub use arm::{Arm, ArmFault, Command, Controller, Safety, State};
 pub use black_box::BlackBox;
 pub use contact::pressure::{ContactWatch, Face, Pressure};
-pub use contact::{ContactError, ContactLaw, ContactSettings, SkinEstimate};
+pub use contact::{ContactError, ContactLaw, ContactSettings, Patience, SkinEstimate};
 pub use guard::{
     Allowance, Guard, GuardLimits, Phase, Plane, ProbePlace, Tilt, Trip, Verdict, Watch, Workspace,
     probe_place,

@@ -7,7 +7,7 @@ mod status;
 
 use probepath_robot::motion::timing::PathClock;
 use probepath_robot::{
-    Asked, Command, ContactLaw, ContactSettings, Controller, Joints, Operator, Safety, State,
+    Asked, Command, ContactLaw, ContactSettings, Controller, Joints, Operator, Patience, Safety, State,
 };
 
 use crate::Plan;
@@ -56,6 +56,7 @@ pub struct Replay {
     legs: Vec<Leg>,
     clock: PathClock,
     law: ContactLaw,
+    patience: Patience,
     touch: Touch,
     on_path: OnPath,
     begun: bool,
@@ -92,6 +93,7 @@ impl Replay {
             legs,
             clock,
             law,
+            patience: Patience::new(dt),
             touch,
             on_path,
             begun,
@@ -197,6 +199,7 @@ impl Replay {
     /// Along the path, the force held.
     fn follow(&mut self, state: &State, cap: f64, yielding: bool, pause: bool) -> Option<Joints> {
         let set_n = if yielding { self.settings.yielding_n() } else { self.settings.force_n };
+        self.law.beside(self.clock.speed());
         self.law.step(self.pressing(state), set_n);
         let force = self.law.force_n();
         let soft = self.settings.soft_limit_n;
@@ -204,8 +207,8 @@ impl Replay {
         let waits = pause || yielding;
         let cap = if waits { self.settings.resume_speed } else { self.risen(cap) };
         let most = self.plan.settings.speed.speed.min(cap).min(self.pace);
-        let speed = if waits { 0.0 } else { most * self.settings.eased(force) };
-        let s = self.clock.step(speed, self.dt);
+        let most = self.patience.step(&self.law, set_n, most);
+        let s = self.clock.step(if waits { 0.0 } else { most }, self.dt);
         self.stage = if self.touch.is_lost(force, self.settings.lost_below_n) {
             Stage::Lift { ending: ReplayEnding::ContactLost { at_m: s } }
         } else if self.clock.has_arrived() && self.on_path.keeps_up() {
@@ -226,6 +229,7 @@ impl Replay {
     /// Up along the probe's axis to the standoff; what still moves along the path comes to rest.
     fn lift(&mut self, state: &State, ending: ReplayEnding, pause: bool) -> Option<Joints> {
         self.clock.step(0.0, self.dt);
+        self.law.beside(self.clock.speed());
         let up = self.law.offset_m() <= 0.5e-3;
         let rests = self.law.speed_m_s().abs() < 1e-6 && self.clock.is_at_rest();
         if up && rests {

@@ -9,6 +9,8 @@ use super::arm_lag::ArmLag;
 pub struct ContactSettings {
     /// Largest speed along the probe's z (m/s). 0.042.
     pub speed_m_s: f64,
+    /// Largest speed of the law and of the path together (m/s): below what the guard allows on the skin, by what turns. 0.045.
+    pub together_m_s: f64,
     /// Largest acceleration along it (m/s²). 1.
     pub acceleration_m_s2: f64,
     /// Largest jerk along it (m/s³). 40.
@@ -41,6 +43,7 @@ impl Default for ContactSettings {
     fn default() -> Self {
         Self {
             speed_m_s: 0.042,
+            together_m_s: 0.045,
             acceleration_m_s2: 1.0,
             jerk_m_s3: 40.0,
             lowest_m: -0.04,
@@ -82,6 +85,7 @@ impl ContactSettings {
     pub(super) fn check(&self, dt: f64) -> Result<ArmLag, ContactError> {
         let positive = [
             ("speed", self.speed_m_s),
+            ("speed together with the path", self.together_m_s),
             ("acceleration", self.acceleration_m_s2),
             ("jerk", self.jerk_m_s3),
             ("highest offset", self.highest_m),

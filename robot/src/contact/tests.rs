@@ -115,12 +115,15 @@ impl Plant {
     }
 }
 
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Held {
     rms: f64,
     overshoot: f64,
     most: f64,
     largest_jerk: f64,
+    /// The law's and the path's speed together, at most (m/s).
+    together: f64,
+    took_s: f64,
 }
 
 /// Touches down, then follows 150 mm of a random skin.
@@ -132,12 +135,14 @@ fn scan(seed: u64, speed: f64, disturbance: Disturbance) -> Held {
 
 /// The worst of many seeds, and the mean RMS.
 fn worst(seeds: u64, speed: f64, disturbance: Disturbance) -> (Held, f64) {
-    let mut worst = Held { rms: 0.0, overshoot: 0.0, most: 0.0, largest_jerk: 0.0 };
+    let mut worst = Held::default();
     let mut sum = 0.0;
     for seed in 0..seeds {
         let held = scan(seed, speed, disturbance);
         sum += held.rms;
         worst.rms = worst.rms.max(held.rms);
+        worst.took_s = worst.took_s.max(held.took_s);
+        worst.together = worst.together.max(held.together);
         worst.overshoot = worst.overshoot.max(held.overshoot);
         worst.most = worst.most.max(held.most);
         worst.largest_jerk = worst.largest_jerk.max(held.largest_jerk);
@@ -146,14 +151,30 @@ fn worst(seeds: u64, speed: f64, disturbance: Disturbance) -> (Held, f64) {
     (worst, sum / seeds as f64)
 }
 
+/// Along the path a tick on, toward a speed, as smoothly as the path's clock with a part of its brake.
+fn toward(way: &Motion, speed: f64) -> Motion {
+    let off = way.velocity - speed * DT;
+    let (acceleration, jerk) = if off > 0.0 { (0.4, 10.0) } else { (0.2, 4.0) };
+    let bounds = Bounds {
+        lower: 0.0,
+        upper: 1.0,
+        velocity: DT,
+        acceleration: acceleration * DT * DT,
+        jerk: jerk * DT.powi(3),
+    };
+    way.after(axis::brake(&Motion { velocity: off, ..*way }, &bounds))
+}
+
 fn hold(skin: &Skin, mut plant: Plant) -> Held {
     let law = ContactLaw::new(ContactSettings::default(), PERIOD).unwrap();
     let mut down = TouchDown::new(law);
     let gap = 0.005;
     let (mut x, mut force, mut squares, mut count) = (0.0, 0.0, 0.0, 0.0);
-    let mut held = Held { rms: 0.0, overshoot: 0.0, most: 0.0, largest_jerk: 0.0 };
+    let mut held = Held::default();
     let mut offsets = [0.0; 4];
-    for tick in 0..10_000 {
+    let mut patience = Patience::new(DT);
+    let mut way = Motion { position: 0.0, velocity: 0.0, acceleration: 0.0 };
+    for tick in 0..20_000 {
         let measured = plant.measured(force);
         let offset = down.step(measured);
         plant.follow(offset);
@@ -161,7 +182,12 @@ fn hold(skin: &Skin, mut plant: Plant) -> Held {
         let surface = gap + skin.height(x) - skin.height(0.0) - lifted;
         force = (skin.stiffness(x) * (plant.at - surface)).max(0.0);
         if down.phase == Phase::Held {
-            x += skin.speed * DT;
+            let speed = patience.step(&down.law, WANTED, skin.speed);
+            way = toward(&way, speed);
+            assert!(way.velocity > -1e-9, "it went back");
+            x = way.position;
+            down.law.beside(way.velocity / DT);
+            held.together = held.together.max(way.velocity / DT + down.law.speed_m_s().abs());
             held.most = held.most.max(force);
             squares += (force - WANTED).powi(2);
             count += 1.0;
@@ -172,9 +198,10 @@ fn hold(skin: &Skin, mut plant: Plant) -> Held {
         let jerk = (offsets[0] - 3.0 * offsets[1] + 3.0 * offsets[2] - offsets[3]) / DT.powi(3);
         held.largest_jerk = held.largest_jerk.max(jerk.abs());
         if x > 0.15 {
+            held.took_s = f64::from(tick) * DT;
             break;
         }
-        assert!(tick < 9_999 || x > 0.05, "only {x} m");
+        assert!(tick < 19_999, "only {x} m");
     }
     held.rms = (squares / f64::max(count, 1.0)).sqrt();
     held
@@ -182,7 +209,7 @@ fn hold(skin: &Skin, mut plant: Plant) -> Held {
 
 #[test]
 fn a_thousand_skins_are_held_within_a_tenth_of_a_newton_and_touched_within_half_of_one() {
-    for (speed, rms) in [(0.010, 0.12), (0.020, 0.28)] {
+    for (speed, rms) in [(0.010, 0.10), (0.020, 0.10)] {
         let (worst, mean) = worst(500, speed, Disturbance::None);
         assert!(mean <= 0.1, "{mean} N RMS");
         assert!(worst.rms <= rms, "{} N RMS", worst.rms);
@@ -196,8 +223,8 @@ fn a_thousand_skins_are_held_within_a_tenth_of_a_newton_and_touched_within_half_
 fn breathing_a_leg_that_moves_and_a_bump_never_press_more_than_ten_newtons() {
     for disturbance in [Disturbance::Breathing, Disturbance::Moves, Disturbance::Bump] {
         for speed in [0.010, 0.020] {
-            let (worst, mean) = worst(60, speed, disturbance);
-            assert!(worst.most <= 10.0 && mean <= 0.55, "{worst:?} {mean}");
+            let (worst, _) = worst(60, speed, disturbance);
+            assert!(worst.most <= 10.0 && worst.rms <= 0.5, "{worst:?}");
         }
     }
 }

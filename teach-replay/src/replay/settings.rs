@@ -74,21 +74,10 @@ pub enum ReplayError {
     Step(#[from] StepError),
 }
 
-/// Force errors (N) up to which the speed along the path stays, and from which it is a quarter: where the skin is
-/// rougher than the law can follow, it has more time.
-const EASED_N: (f64, f64) = (0.6, 1.6);
-
 impl ReplaySettings {
     /// The force (N) that is held while it is above the soft limit: as far below the usual one as the limit is above.
     pub(super) fn yielding_n(&self) -> f64 {
         (2.0 * self.force_n - self.soft_limit_n).max(0.4 * self.force_n)
-    }
-
-    /// What part of the speed along the path a force (N) leaves.
-    pub(super) fn eased(&self, force_n: f64) -> f64 {
-        let (from, to) = EASED_N;
-        let off = (force_n - self.force_n).abs();
-        1.0 - 0.75 * ((off - from) / (to - from)).clamp(0.0, 1.0)
     }
 
     pub(super) fn check(&self) -> Result<(), ReplayError> {

@@ -21,7 +21,7 @@ pub(super) enum Phase {
 }
 
 pub(super) struct TouchDown {
-    law: ContactLaw,
+    pub(super) law: ContactLaw,
     pub(super) phase: Phase,
     near_s: f64,
 }
