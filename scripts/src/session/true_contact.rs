@@ -27,6 +27,8 @@ pub struct TrueContact {
     pub most_n: f64,
     /// The mean error while the probe stood still on the skin, settled; none when it never did.
     pub steady_n: Option<f64>,
+    /// How fast the probe went along the path, on the mean (m/s); standing still is left out.
+    pub speed_m_s: f64,
 }
 
 impl Session {
@@ -59,6 +61,7 @@ impl Session {
                 .max(0.0),
             most_n: most(moments.get(touched..)?),
             steady_n: steady(followed).map(|force| (force - set).abs()),
+            speed_m_s: mean_speed(followed),
         })
     }
 }
@@ -87,6 +90,13 @@ fn touch_down(moments: &[Moment], begin: usize) -> usize {
 fn is_still(followed: &[Moment], i: usize) -> bool {
     let before = i.checked_sub(ticks(STILL_S)).and_then(|before| followed.get(before));
     before.zip(followed.get(i)).is_some_and(|(before, now)| across(before, now) < STILL_M)
+}
+
+/// How fast the probe went across its axis, on the mean (m/s), where it did not stand still.
+fn mean_speed(followed: &[Moment]) -> f64 {
+    let way = |i: usize| Some(across(followed.get(i.checked_sub(1)?)?, followed.get(i)?));
+    let moving = || (0..followed.len()).filter(|i| !is_still(followed, *i));
+    moving().filter_map(way).sum::<f64>() / (moving().count() as f64 * TICK.seconds())
 }
 
 /// The mean force over the longest time that the probe stood still, once it had settled.

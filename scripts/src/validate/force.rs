@@ -29,6 +29,7 @@ const PUBLISHED: &str = "0.098";
 
 /// What a scan of one seed came to.
 struct Held {
+    wanted_m_s: f64,
     truth: TrueContact,
     measured_rms_n: f64,
 }
@@ -116,12 +117,31 @@ impl Bench<'_> {
                 None,
                 None,
             ));
+            rows.push(Goal::of(
+                format!("time along the path at {mm_s:.0} mm/s, as a multiple of what that speed takes"),
+                &of(|held| held.wanted_m_s / held.truth.speed_m_s),
+                None,
+                None,
+            ));
+            rows.extend(self.undisturbed_on_even_skins(speed_m_s)?);
             overshoot.extend(of(|held| held.truth.overshoot_n));
             steady.extend(held.iter().filter_map(|held| held.truth.steady_n));
         }
         rows.push(Goal::of("true force, touch-down overshoot, N", &overshoot, Some(OVERSHOOT_N), None));
         rows.push(Goal::of("true force, mean error standing still, N", &steady, Some(STEADY_N), None));
         Ok(rows)
+    }
+
+    /// The same on the softest skin everywhere, and on the hardest.
+    fn undisturbed_on_even_skins(&self, speed_m_s: f64) -> Result<Vec<Goal>, ValidateError> {
+        let row = |(name, config): (&str, SkinConfig)| {
+            let skin = Skin { config, ..Skin::default() };
+            let held = self.all(&format!("at rest, skin of {name}"), speed_m_s, &skin)?;
+            let rms: Vec<_> = held.iter().map(|held| held.truth.rms_n).collect();
+            let what = format!("true force at {:.0} mm/s, skin of {name}, RMS error, N", speed_m_s * 1e3);
+            Ok(Goal::of(what, &rms, Some(HELD_N), None))
+        };
+        skins().into_iter().skip(1).map(row).collect()
     }
 
     /// The leg under one disturbance, which begins when the path has been taught.
@@ -171,6 +191,6 @@ impl Bench<'_> {
         let wish = ScanWish { look: false, speed_m_s, ..ScanWish::default() };
         let scan = session.scan(&path, &wish).map_err(wrong)?;
         let truth = session.true_contact(&scan).ok_or(wrong(SessionError::Order("nothing was followed")))?;
-        Ok(Held { truth, measured_rms_n: scan.figures.force_n.rms_error })
+        Ok(Held { wanted_m_s: speed_m_s, truth, measured_rms_n: scan.figures.force_n.rms_error })
     }
 }
