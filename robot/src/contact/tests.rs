@@ -220,11 +220,11 @@ fn a_thousand_skins_are_held_within_a_tenth_of_a_newton_and_touched_within_half_
 }
 
 #[test]
-fn breathing_a_leg_that_moves_and_a_bump_never_press_more_than_ten_newtons() {
+fn breathing_a_leg_that_moves_and_a_bump_press_ten_newtons_at_most_and_are_half_a_newton_off_rms() {
     for disturbance in [Disturbance::Breathing, Disturbance::Moves, Disturbance::Bump] {
         for speed in [0.010, 0.020] {
             let (worst, _) = worst(60, speed, disturbance);
-            assert!(worst.most <= 10.0 && worst.rms <= 0.5, "{worst:?}");
+            assert!(worst.most <= 10.0 && worst.rms <= 0.5 && worst.together <= 0.045 + 1e-9, "{worst:?}");
         }
     }
 }
