@@ -35,6 +35,9 @@ const STEEP: f64 = 0.75;
 const GENTLE: f64 = 0.4;
 /// The least descent or lift that counts (m along the probe's axis): below it, it is a bump of the skin.
 const LEAST_DROP: f64 = 0.005;
+/// The least lift that counts (m) when such a descent follows at the same place: over hard skin a hand that lifts does not
+/// rise far, and what came down steeply was up.
+const LEAST_PAIRED: f64 = 0.0025;
 /// Part of a lift that has to be lost again, however slowly, before the probe is back on the skin.
 const BACK: f64 = 0.6;
 /// A descent of less than this (m), after the probe went along for at least [`ALONG`], is a hand that presses deeper
@@ -164,12 +167,24 @@ fn drops(samples: &[Sample], places: &[Vector3<f64>], heights: &[f64]) -> Vec<Dr
         let run = &cosines[from..from + same];
         let range = strides[from]..strides[from + same - 1];
         let by = heights[range.start] - heights[range.end];
-        if way(cosines[from]) != 0 && by.abs() >= LEAST_DROP && run.iter().any(|c| c.abs() >= STEEP) {
+        if way(cosines[from]) != 0 && by.abs() >= LEAST_PAIRED && run.iter().any(|c| c.abs() >= STEEP) {
             found.push(Drop { range, by });
         }
         from += same;
     }
-    found
+    found.retain(|drop: &Drop| drop.by < 0.0 || drop.by >= LEAST_DROP);
+    paired(samples, places, &found)
+}
+
+/// Without the small lifts that no descent follows at the same place.
+fn paired(samples: &[Sample], places: &[Vector3<f64>], drops: &[Drop]) -> Vec<Drop> {
+    let counts = |(i, drop): (usize, &Drop)| {
+        let comes_down = drops.get(i + 1).is_some_and(|next| {
+            next.by > 0.0 && !went_along(samples, places, drop.range.start..next.range.end)
+        });
+        (drop.by.abs() >= LEAST_DROP || comes_down).then(|| drop.clone())
+    };
+    drops.iter().enumerate().filter_map(counts).collect()
 }
 
 /// Samples a stride apart.

@@ -259,6 +259,11 @@ fn there_and_back(apart: f64) -> Vec<Sample> {
         Vector3::new(apart, 0.0, 0.0),
         Vector3::new(apart, 0.0, 0.05),
     ];
+    walked(&corners)
+}
+
+/// From corner to corner at 15 mm/s, the face down.
+fn walked(corners: &[Vector3<f64>]) -> Vec<Sample> {
     let mut samples = Vec::new();
     for pair in corners.windows(2) {
         let ticks = ((pair[1] - pair[0]).norm() / 0.015 * 500.0).ceil();
@@ -275,6 +280,26 @@ fn there_and_back(apart: f64) -> Vec<Sample> {
         }
     }
     samples
+}
+
+#[test]
+fn a_hand_that_lifts_a_little_and_comes_down_deeper_taught_no_tent() {
+    for (up, down) in [(0.005, 0.008), (0.006, 0.008), (0.006, 0.010), (0.008, 0.010)] {
+        let at = |y: f64, z: f64| Vector3::new(0.0, y, z);
+        let corners = [
+            at(0.0, 0.05),
+            at(0.0, 0.0),
+            at(0.04, 0.0),
+            at(0.041, up),
+            at(0.042, up - down),
+            at(0.08, up - down),
+            at(0.08, 0.05),
+        ];
+        let (path, report) = Path::clean(&walked(&corners), label(), &Cleaning::default()).unwrap();
+        let highest = path.points().iter().map(|p| p.base_from_probe.origin().vector().z - 0.1);
+        let highest = highest.fold(f64::NEG_INFINITY, f64::max);
+        assert!(highest < 0.5e-3, "{up} m up, {down} m down: {highest} m, {report:?}");
+    }
 }
 
 #[test]
