@@ -56,6 +56,8 @@ pub struct ContactLaw {
     settings: ContactSettings,
     bounds: Bounds,
     dt: f64,
+    /// The speed of the path beside it (m/s).
+    path_m_s: f64,
     /// The offset and its differences, per tick.
     motion: Motion,
     arm: ArmLag,
@@ -96,6 +98,7 @@ impl ContactLaw {
             settings,
             bounds,
             dt,
+            path_m_s: 0.0,
             motion: Motion { position: 0.0, velocity: 0.0, acceleration: 0.0 },
             arm,
             felt_at: 0.0,
@@ -128,6 +131,7 @@ impl ContactLaw {
     /// From now on the law goes no faster than a path that is followed at this speed (m/s) leaves it of the speed that
     /// both have together; a quarter of its own is always left.
     pub fn beside(&mut self, path_speed_m_s: f64) {
+        self.path_m_s = path_speed_m_s;
         let s = &self.settings;
         let left = s.together_m_s - path_speed_m_s;
         self.bounds.velocity = left.max(LEFT_TO_THE_LAW * s.speed_m_s).min(s.speed_m_s) * self.dt;

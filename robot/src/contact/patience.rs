@@ -2,10 +2,16 @@
 //!
 //! Along the path the skin moves under the probe as fast as the path is followed, and the error of the force grows with
 //! the square of that. So whoever cannot keep up has more time: the speed falls where the force is off, where the place to
-//! go to moves fast, and where little is known of the skin's stiffness; and what the law needs of the probe's speed
-//! the path leaves to it. It falls at once and rises slowly; the path's clock makes it smooth.
+//! go to moves fast, and where the force was off lately for how fast it went ([`unrest`]); and what the law needs of the
+//! probe's speed the path leaves to it. It falls at once and rises slowly; the path's clock makes it smooth.
+//!
+//! How unsure the stiffness is does not count: reckoned with too high it only makes the law slow, and what comes of that
+//! is seen in the force.
+
+mod unrest;
 
 use super::ContactLaw;
+use unrest::Unrest;
 
 /// The part of the speed that is always left.
 const LEAST: f64 = 0.1;
@@ -13,11 +19,9 @@ const LEAST: f64 = 0.1;
 const OFF_N: (f64, f64) = (0.2, 0.7);
 /// Speeds of the place to go to (m/s), likewise.
 const RATE_M_S: (f64, f64) = (0.003, 0.015);
-/// Deviations of the stiffness, as a part of it: up to the first the speed stays, from the second it is at most
-/// [`UNSURE_M_S`].
-const UNSURE: (f64, f64) = (0.15, 0.35);
-/// At this speed (m/s) the law holds the force even when it reckons with skin ten times too stiff.
-const UNSURE_M_S: f64 = 0.01;
+/// However restless the force was, at this speed (m/s) the law holds it, even when it reckons with skin ten times too
+/// stiff.
+const RESTLESS_M_S: f64 = 0.01;
 /// Over how long force and rate are smoothed (s): longer than the sensor's noise.
 const OVER_S: f64 = 0.02;
 /// From nothing to the whole speed in so long (s), at least.
@@ -32,6 +36,7 @@ pub struct Patience {
     /// The force's error (N) and the goal's speed (m/s), smoothed.
     off_n: f64,
     rate_m_s: f64,
+    unrest: Unrest,
     /// The part of the speed that is left, and the one told last.
     share: f64,
     told: f64,
@@ -47,7 +52,8 @@ fn falling(value: f64, (from, to): (f64, f64), least: f64) -> f64 {
 impl Patience {
     /// Slow at first. A step every `dt` seconds.
     pub const fn new(dt: f64) -> Self {
-        Self { dt, off_n: 0.0, rate_m_s: 0.0, share: LEAST, told: LEAST }
+        let unrest = Unrest::new(dt);
+        Self { dt, off_n: 0.0, rate_m_s: 0.0, unrest, share: LEAST, told: LEAST }
     }
 
     /// One tick, after the law's: how fast (m/s) a path may be followed that is `wanted` to be followed at some speed
@@ -56,18 +62,18 @@ impl Patience {
         let new = self.dt / (OVER_S + self.dt);
         self.off_n += new * (law.raw - set_n - self.off_n);
         self.rate_m_s += new * (law.goal.1 - self.rate_m_s);
+        self.unrest.see(law.raw - set_n, law.path_m_s);
         let kept = falling(self.off_n.abs(), OFF_N, LEAST);
         let calm = falling(self.rate_m_s.abs(), RATE_M_S, LEAST);
-        let share = kept.min(calm).min(Self::known(law, wanted)).min(self.left(law, wanted));
+        let share = kept.min(calm).min(self.restful(wanted)).min(self.left(law, wanted));
         self.share = share.min(self.share + self.dt / RISES_IN_S);
         self.tell() * wanted
     }
 
-    /// What the knowledge of the skin's stiffness leaves.
-    fn known(law: &ContactLaw, wanted: f64) -> f64 {
-        let skin = law.skin();
-        let least = (UNSURE_M_S / wanted.max(UNSURE_M_S)).min(1.0);
-        falling(skin.deviation_n_m / skin.stiffness_n_m, UNSURE, least)
+    /// What the force's unrest leaves.
+    fn restful(&self, wanted: f64) -> f64 {
+        let most = self.unrest.speed_m_s().max(RESTLESS_M_S);
+        if wanted > most { most / wanted } else { 1.0 }
     }
 
     /// What the law leaves of the speed that both have together.
@@ -95,16 +101,17 @@ mod tests {
 
     const DT: f64 = 0.002;
 
-    /// A law on even skin of 1 N/mm that rises at `rise` m/s, and what its patience told last of 20 mm/s.
+    /// A law on even skin of 1 N/mm that rises at `rise` m/s after a while, and what its patience told last of 20 mm/s.
     fn followed(rise: f64) -> (f64, ContactLaw) {
         let mut law = ContactLaw::new(ContactSettings::default(), Span::from_milliseconds(2)).unwrap();
-        let (mut patience, mut force, mut told) = (Patience::new(DT), 5.0, f64::NAN);
+        let (mut patience, mut force, mut told) = (Patience::new(DT), 5.0, 0.0);
         let mut late = [0.0; 8];
-        for tick in 0..600 {
+        for tick in 0..2000 {
+            law.beside(told);
             let at = law.step(force, 5.0);
             late.rotate_right(1);
             late[0] = at;
-            force = (5.0 + 1000.0 * (late[7] + rise * f64::from(tick) * DT)).max(0.0);
+            force = (5.0 + 1000.0 * (late[7] + rise * f64::from((tick - 1400).max(0)) * DT)).max(0.0);
             told = patience.step(&law, 5.0, 0.02);
         }
         (told, law)

@@ -42,6 +42,8 @@ enum Disturbance {
     Moves,
     /// 5 mm high, 10 mm long.
     Bump,
+    /// The skin is 6 mm under the path where the path was taught in the air: a straight 12 mm down, and up again.
+    Tent,
 }
 
 impl Disturbance {
@@ -59,6 +61,7 @@ impl Disturbance {
                 0.0025 * (1.0 + ((x - 0.06) * std::f64::consts::TAU / 0.01).cos())
             }
             Self::Bump => 0.0,
+            Self::Tent => -0.5 * (0.012 - (x - 0.06).abs()).max(0.0),
         }
     }
 }
@@ -227,6 +230,20 @@ fn breathing_a_leg_that_moves_and_a_bump_press_ten_newtons_at_most_and_are_half_
             assert!(worst.most <= 10.0 && worst.rms <= 0.5 && worst.together <= 0.045 + 1e-9, "{worst:?}");
         }
     }
+}
+
+#[test]
+fn a_taught_path_that_stands_over_hard_skin_like_a_tent_is_followed_softly() {
+    let mut most = Held::default();
+    for seed in 0..50 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let skin = Skin { stiffness: vec![3000.0; 20], waves: [(0.0, 0.1, 0.0); 2], ..Skin::new(&mut rng) };
+        let skin = Skin { speed: 0.020, disturbance: Disturbance::Tent, ..skin };
+        let held = hold(&skin, Plant::new(rng));
+        (most.rms, most.most) = (most.rms.max(held.rms), most.most.max(held.most));
+    }
+    println!("tent: {most:?}");
+    assert!(most.rms <= 0.25 && most.most <= 7.0, "{most:?}");
 }
 
 #[test]
