@@ -1,6 +1,7 @@
 //! The lumen in each B-scan of a sweep: the seed goes from image to image, the wall is fitted in each.
 
 mod again;
+mod astray;
 mod beam;
 mod branches;
 mod contour;
@@ -25,7 +26,7 @@ use crate::patch::PowerOfGrey;
 use crate::settings::FWHM;
 use crate::{LumenSettings, SeedPoint};
 use contour::Uncertainty;
-use fit::{Border, FitInput, Plane};
+use fit::{Border, FitInput, Plane, Start};
 use region::{RAYS, Region, angle};
 use wall::{WallPrior, Walls};
 
@@ -61,7 +62,7 @@ pub fn segment(images: &[PlacedBScan], settings: &LumenSettings) -> Vec<ImageLum
             .zip(borders.par_iter())
             .map(|(((image, region), planes), border)| {
                 let (Ok(region), Ok(earlier)) = (region, border) else { return border.clone() };
-                look.fitted(image, region, planes, Some(earlier))
+                look.fitted(image, region, planes, Start::Again(earlier))
             })
             .collect();
     }
@@ -110,10 +111,11 @@ fn first_borders(
                 let centre = image.world_from_image * Point::new(region.centre.0, region.centre.1, 0.0);
                 let beside = last.as_ref().filter(|last| last.0.distance(&centre) < BESIDE_M);
                 let warm = beside.and_then(|(_, from)| {
-                    let border = look.fitted(image, region, &Plane::ITSELF, Some(from)).ok()?;
+                    let border = look.fitted(image, region, &Plane::ITSELF, Start::Beside(from)).ok()?;
                     look.accepted(image, &border, region).is_ok().then_some(border)
                 });
-                let border = warm.map_or_else(|| look.fitted(image, region, &Plane::ITSELF, None), Ok)?;
+                let border =
+                    warm.map_or_else(|| look.fitted(image, region, &Plane::ITSELF, Start::Front), Ok)?;
                 last = Some((centre, border.clone()));
                 Ok(border)
             });
@@ -138,7 +140,7 @@ struct Look<'a> {
 impl Look<'_> {
     /// The wall round a region, when it is one of a lumen.
     fn walled(&self, image: &PlacedBScan, region: &Region) -> Option<Border> {
-        let border = self.fitted(image, region, &Plane::ITSELF, None).ok()?;
+        let border = self.fitted(image, region, &Plane::ITSELF, Start::Front).ok()?;
         self.accepted(image, &border, region).is_ok().then_some(border)
     }
 
@@ -148,7 +150,7 @@ impl Look<'_> {
         image: &PlacedBScan,
         region: &Region,
         planes: &[Plane],
-        earlier: Option<&Border>,
+        start: Start<'_>,
     ) -> Result<Border, NoLumen> {
         let setting = &image.bscan.setting;
         let depth = setting.window_top_m + region.centre.1;
@@ -156,7 +158,7 @@ impl Look<'_> {
         let sigma = (spread.lateral_m(depth, setting) / FWHM, spread.axial_fwhm_m / FWHM);
         let (wall, sigma_sd) = (self.wall, self.settings.point_spread_sd);
         let (bscan, table) = (&image.bscan, self.table);
-        fit::fit(&FitInput { bscan, table, region, sigma, sigma_sd, wall, planes, earlier })
+        fit::fit(&FitInput { bscan, table, region, sigma, sigma_sd, wall, planes, start })
     }
 
     /// The contour of a border that is one of a lumen.

@@ -10,17 +10,26 @@ use probepath_us_capture::PlacedBScan;
 
 use super::fit::Border;
 use super::region::{RAYS, Region, angle};
-use super::{Look, NoLumen, track};
+use super::{Look, NoLumen, astray, track};
 use crate::PointSpread;
 use crate::settings::FWHM;
 
 /// Lumens farther apart than this say little about what lies between (m).
-const BETWEEN_M: f64 = 16e-3;
+pub(super) const BETWEEN_M: f64 = 16e-3;
 /// A lumen whose centre lies farther than this from where it was expected is another one (m).
-const ASIDE_M: f64 = 2.5e-3;
+pub(super) const ASIDE_M: f64 = 2.5e-3;
+/// A lumen that was carried on may contradict another one, which then leaves its place to what is carried on: so often.
+const ROUNDS: usize = 4;
+/// A disc this near to one that brought nothing brings nothing (m).
+const SAME_M: f64 = 0.3e-3;
+/// A border whose centre is off its region's by this part of its radius is fitted once more.
+const OFF_CENTRE: f64 = 0.3;
+
+/// Where a lumen is expected in an image: x, y, radius (m).
+type Disc = Vector3<f64>;
 
 /// What each image gave so far.
-type Borders = [Result<Border, NoLumen>];
+pub(super) type Borders = [Result<Border, NoLumen>];
 
 /// Looks again at images that were refused, where others have the lumen. What is found there has to show its wall as
 /// any other.
@@ -30,16 +39,24 @@ pub(super) fn second_look(
     regions: &mut [Result<Region, NoLumen>],
     borders: &mut Borders,
 ) {
-    for ((image, border), region) in images.iter().zip(borders.iter_mut()).zip(regions.iter()) {
-        if let (Ok(fitted), Ok(grown)) = (border.as_ref(), region)
-            && let Err(why) = look.accepted(image, fitted, grown)
-        {
+    for ((image, border), region) in images.iter().zip(borders.iter_mut()).zip(regions.iter_mut()) {
+        let (Ok(fitted), Ok(grown)) = (border.as_ref(), region.as_ref()) else { continue };
+        if let Err(why) = look.accepted(image, fitted, grown) {
             *border = Err(why);
+        } else if let Some((disc, fitted)) = centred(image, look, grown, fitted) {
+            (*region, *border) = (Ok(disc), Ok(fitted));
         }
     }
-    fill_between(images, look, regions, borders);
-    carry_on(0..images.len(), images, look, regions, borders);
-    carry_on((0..images.len()).rev(), images, look, regions, borders);
+    astray::refuse(images, borders);
+    let mut tried = vec![None; images.len()];
+    for _ in 0..ROUNDS {
+        fill_between(images, look, regions, borders);
+        carry_on(0..images.len(), images, look, regions, borders, &mut tried);
+        carry_on((0..images.len()).rev(), images, look, regions, borders, &mut tried);
+        if !astray::refuse(images, borders) {
+            break;
+        }
+    }
 }
 
 /// Whether another look may bring something.
@@ -70,14 +87,20 @@ fn carry_on(
     look: &Look<'_>,
     regions: &mut [Result<Region, NoLumen>],
     borders: &mut Borders,
+    tried: &mut [Option<Disc>],
 ) {
     let (mut trail, mut radius) = (Vec::new(), 0.0);
     for index in order {
         let (image, region, border) = (&images[index], &mut regions[index], &mut borders[index]);
         if open(region, border)
-            && let Some((grown, fitted)) = carried(image, look, &trail, radius)
+            && let Some((x, y)) = track::predicted(image, &trail)
         {
-            (*region, *border) = (Ok(grown), Ok(fitted));
+            let disc = Vector3::new(x, y, radius);
+            let anew = tried[index].is_none_or(|before| (before - disc).norm() > SAME_M);
+            tried[index] = Some(disc);
+            if let Some((grown, fitted)) = anew.then(|| carried(image, look, &trail, disc)).flatten() {
+                (*region, *border) = (Ok(grown), Ok(fitted));
+            }
         }
         if let Ok(border) = border {
             let (centre, own) = seen(image, border);
@@ -87,27 +110,55 @@ fn carry_on(
     }
 }
 
-/// The lumen where the trail leads: as a front finds it, or else as a disc of the size it had.
+/// The lumen where the trail leads: as a front finds it, or else as a disc of the size it had. Where the trail ended long
+/// before, it is looked for anew.
 fn carried(
     image: &PlacedBScan,
     look: &Look<'_>,
     trail: &[Vector3<f64>],
-    radius: f64,
+    disc: Disc,
 ) -> Option<(Region, Border)> {
-    let place =
-        track::predicted(image, trail).filter(|place| !track::far_from_trail(image, trail, *place))?;
+    let (place, radius) = ((disc.x, disc.y), disc.z);
+    if track::far_from_trail(image, trail, place) {
+        let region = track::region(image, look.table, look.settings, trail, None).ok()?;
+        return walled(image, look, region);
+    }
     let grown = track::grown(image, look.table, look.settings, place).ok();
-    let disc = disc(image, &look.settings.point_spread, place, radius);
+    let disc = self::disc(image, &look.settings.point_spread, place, radius);
     grown.into_iter().chain([disc]).find_map(|region| {
-        let border = look.walled(image, &region)?;
+        let (region, border) = walled(image, look, region)?;
         let (_, centre) = super::area_and_centre(&border.contour());
         let aside = (centre.0 - place.0).hypot(centre.1 - place.1);
         (aside < ASIDE_M).then_some((region, border))
     })
 }
 
+/// The wall round a region.
+fn walled(image: &PlacedBScan, look: &Look<'_>, region: Region) -> Option<(Region, Border)> {
+    let border = look.walled(image, &region)?;
+    Some(centred(image, look, &region, &border).unwrap_or((region, border)))
+}
+
+/// Harmonics are about the region's centre: where that is not the lumen's, the wall is fitted once more, about the
+/// lumen's.
+fn centred(
+    image: &PlacedBScan,
+    look: &Look<'_>,
+    region: &Region,
+    border: &Border,
+) -> Option<(Region, Border)> {
+    let (area, (x, y)) = super::area_and_centre(&border.contour());
+    let radius = (area / std::f64::consts::PI).sqrt();
+    if (x - region.centre.0).hypot(y - region.centre.1) < OFF_CENTRE * radius {
+        return None;
+    }
+    let disc = disc(image, &look.settings.point_spread, (x, y), radius);
+    let border = look.walled(image, &disc)?;
+    Some((disc, border))
+}
+
 /// Centre in the World and radius (m) of a border.
-fn seen(image: &PlacedBScan, border: &Border) -> (Vector3<f64>, f64) {
+pub(super) fn seen(image: &PlacedBScan, border: &Border) -> (Vector3<f64>, f64) {
     let (area, (x, y)) = super::area_and_centre(&border.contour());
     let centre = image.world_from_image * Point::new(x, y, 0.0);
     (centre.vector(), (area / std::f64::consts::PI).sqrt())

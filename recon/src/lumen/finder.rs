@@ -10,7 +10,7 @@ use super::beam::{self, Section};
 use super::branches::Branches;
 use super::region::Region;
 use super::wall::{WallPrior, Walls};
-use super::{Border, Contour, ImageLumen, Look, NoLumen, Plane, track};
+use super::{Border, Contour, ImageLumen, Look, NoLumen, Plane, Start, track};
 use crate::LumenSettings;
 use crate::patch::PowerOfGrey;
 
@@ -108,12 +108,12 @@ impl Followed {
             (Some(section), Some(last)) => {
                 let own = Section { centre: centre.vector(), radius: section.radius };
                 let planes = beam::of_image(image, &own, self.sections.iter(), &look.settings.point_spread);
-                self.walled(image, region, look, (&planes, Some(last)))
+                self.walled(image, region, look, (&planes, Start::Beside(last)))
             }
             _ => Err(NoLumen::Unsettled),
         };
         let (border, contour) =
-            found.or_else(|_| self.walled(image, region, look, (&Plane::ITSELF, None)))?;
+            found.or_else(|_| self.walled(image, region, look, (&Plane::ITSELF, Start::Front)))?;
         self.remember(image, border);
         Ok(contour)
     }
@@ -123,9 +123,9 @@ impl Followed {
         image: &PlacedBScan,
         region: &Region,
         look: &Look<'_>,
-        (planes, last): (&[Plane], Option<&Border>),
+        (planes, start): (&[Plane], Start<'_>),
     ) -> Result<(Border, Contour), NoLumen> {
-        let border = look.fitted(image, region, planes, last)?;
+        let border = look.fitted(image, region, planes, start)?;
         let contour = look.accepted(image, &border, region)?;
         Ok((border, contour))
     }

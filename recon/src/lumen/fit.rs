@@ -57,6 +57,7 @@ const MOST_STEPS: usize = 8;
 type Harmonics = SMatrix<f64, BORDER, BORDER>;
 
 /// What the fit is told.
+#[derive(Clone, Copy)]
 pub(crate) struct FitInput<'a> {
     /// The image, and what its grey levels stand for.
     pub(crate) bscan: &'a BScan,
@@ -71,8 +72,29 @@ pub(crate) struct FitInput<'a> {
     pub(crate) wall: WallPrior,
     /// What the beam's thickness takes in.
     pub(crate) planes: &'a [Plane],
-    /// A fit of the same lumen to go on from: in this image, or the one beside it.
-    pub(crate) earlier: Option<&'a Border>,
+    /// Where it begins.
+    pub(crate) start: Start<'a>,
+}
+
+/// Where a fit begins.
+#[derive(Clone, Copy)]
+pub(crate) enum Start<'a> {
+    /// At what the front filled.
+    Front,
+    /// Where the image beside this one has the lumen, unless the wall is seen to rise elsewhere: from inside it, a fit may
+    /// end at a speckle.
+    Beside(&'a Border),
+    /// Where an earlier fit of this image ended.
+    Again(&'a Border),
+}
+
+impl<'a> Start<'a> {
+    const fn earlier(self) -> Option<&'a Border> {
+        match self {
+            Self::Front => None,
+            Self::Beside(border) | Self::Again(border) => Some(border),
+        }
+    }
 }
 
 /// A plane parallel to the image, within the thickness of the beam: where the vessel is there, relative to the image.
@@ -161,7 +183,7 @@ fn harmonic<const N: usize>(unknowns: &Vector, from: usize, theta: f64) -> f64 {
 
 /// The unknowns, their prior, and what they are held against.
 struct Model<'a> {
-    input: &'a FitInput<'a>,
+    input: FitInput<'a>,
     lattice: Lattice,
     steps: Steps,
     fields: Fields,
@@ -197,15 +219,19 @@ fn limited(step: Vector) -> Vector {
 }
 
 impl<'a> Model<'a> {
-    fn new(input: &'a FitInput<'a>) -> Result<Self, NoLumen> {
+    fn new(input: &FitInput<'a>) -> Result<Self, NoLumen> {
         let mut start: [f64; BINS] = std::array::from_fn(|bin| start_radius(input, direction(bin)));
         let sigma = (input.sigma.0 / 2_f64.sqrt(), input.sigma.1 / 2_f64.sqrt());
         let mut lattice = lattice(input, &start, sigma)?;
         let speckle = std::f64::consts::TAU * input.sigma.0 * input.sigma.1;
         let inside = std::array::from_fn(|bin| (start[bin] - front_to_wall(input, direction(bin))) as f32);
         let sight = Sight::new(&lattice, &inside);
-        if input.earlier.is_none() {
-            let off = sight.farther_out(|bin| front_to_wall(input, direction(bin)));
+        let off = sight.farther_out(|bin| front_to_wall(input, direction(bin)));
+        if matches!(input.start, Start::Beside(_)) && off.abs() > LARGEST_STEP_M {
+            return Self::new(&FitInput { start: Start::Front, ..*input });
+        }
+        let earlier = input.start.earlier();
+        if earlier.is_none() {
             start.iter_mut().for_each(|r| *r += off.clamp(-LARGEST_STEP_M, FARTHEST_OUT_M));
         }
         lattice.limit(|bin| start[bin] + input.wall.thickness_m + BEYOND_M);
@@ -213,7 +239,7 @@ impl<'a> Model<'a> {
         Ok(Self {
             steps: Steps::new(input.planes, lattice.cell),
             fields: Fields::new(&lattice, sigma),
-            unknowns: input.earlier.map_or(prior, |border| border.unknowns),
+            unknowns: earlier.map_or(prior, |border| border.unknowns),
             prior,
             prior_sd,
             weights: Weights {
@@ -221,8 +247,8 @@ impl<'a> Model<'a> {
                 floor: 0.0,
                 trust: sight.trust,
             },
-            gains: input.earlier.map_or(Gains::NONE, |border| border.gains.clone()),
-            input,
+            gains: earlier.map_or(Gains::NONE, |border| border.gains.clone()),
+            input: *input,
             lattice,
             sight,
         })
@@ -346,7 +372,7 @@ fn mean_square(square: impl Fn(usize) -> f64) -> f64 {
 
 /// The cells round the lumen, far enough for the point spread to reach in.
 fn lattice(input: &FitInput<'_>, start: &[f64; BINS], sigma: (f64, f64)) -> Result<Lattice, NoLumen> {
-    let farther = if input.earlier.is_none() { FARTHEST_OUT_M } else { 0.0 };
+    let farther = if input.start.earlier().is_none() { FARTHEST_OUT_M } else { 0.0 };
     let far = start.iter().copied().fold(0.0, f64::max) + farther + input.wall.thickness_m + BEYOND_M;
     let wanted = Wanted {
         centre: input.region.centre,
@@ -359,7 +385,7 @@ fn lattice(input: &FitInput<'_>, start: &[f64; BINS], sigma: (f64, f64)) -> Resu
 
 /// Where the wall is looked for first: where an earlier fit had it, or the front's border moved out.
 fn start_radius(input: &FitInput<'_>, theta: f64) -> f64 {
-    if let Some(border) = input.earlier {
+    if let Some(border) = input.start.earlier() {
         return border.radius(theta);
     }
     let at = theta.rem_euclid(std::f64::consts::TAU) / std::f64::consts::TAU * RAYS as f64;

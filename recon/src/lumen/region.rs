@@ -37,10 +37,14 @@ struct Statistics {
     tissue: (f64, f64),
 }
 
-/// Grows the region round `seed` (m, in the image).
-pub(crate) fn grow(patch: &Patch, seed: (f64, f64)) -> Result<Region, NoLumen> {
+/// Standard deviations of the smoothing, in widths of the point spread: speckle is as coarse as that is wide, and its
+/// holes are as deep after it in every picture.
+const SMOOTH: (f64, f64) = (0.18, 0.57);
+
+/// Grows the region round `seed` (m, in the image), where a point is this wide (full widths along x and y, m).
+pub(crate) fn grow(patch: &Patch, seed: (f64, f64), widths: (f64, f64)) -> Result<Region, NoLumen> {
     let outside = NoLumen::OutsidePicture { x_mm: seed.0 * 1e3, y_mm: seed.1 * 1e3 };
-    let smooth = patch.smoothed((0.30e-3, 0.20e-3));
+    let smooth = patch.smoothed((SMOOTH.0 * widths.0, SMOOTH.1 * widths.1));
     let db: Vec<f32> = smooth.iter().map(|power| decibel(*power)).collect();
     let start = darkest_near(patch, &smooth, seed, 1.0e-3).ok_or(outside)?;
     let (lumen, tissue) = (lumen_round(patch, &db, start), tissue(&db));
@@ -179,7 +183,12 @@ fn describe(patch: &Patch, cells: &[usize]) -> Result<Region, NoLumen> {
     let mut sorted = raw.clone();
     sorted.sort_by(f64::total_cmp);
     // A leak through a weak piece of wall, or a branch, reaches far in few directions.
-    let far = 1.6 * sorted[RAYS / 2];
+    let median = sorted[RAYS / 2];
+    // Cells that lie round their centre are those of a lumen, a heap of speckle's holes has none there.
+    if median <= 0.0 {
+        return Err(NoLumen::Radius { radius_mm: 0.0 });
+    }
+    let far = 1.6 * median;
     let radii: Vec<f64> = (0..RAYS).map(|ray| median_round(&raw, ray).min(far)).collect();
     let inside: f64 = radii.iter().map(|r| r * r).sum::<f64>() * std::f64::consts::PI / RAYS as f64;
     Ok(Region { centre, radii, excess: area / inside.max(1e-12) })

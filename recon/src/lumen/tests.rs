@@ -98,6 +98,44 @@ fn a_vessel_nearly_closed_is_right_or_refused_and_found_again_behind_it() {
 }
 
 #[test]
+fn coarse_speckle_leads_no_sweep_astray() {
+    // Half as coarse again as the model of the setting, and a narrowing in which speckle's holes are as wide as the lumen.
+    let spread = (0.5, 2.37, 3.0);
+    let mut settings = LumenSettings::default();
+    let own = &mut settings.point_spread;
+    (own.axial_fwhm_m, own.line_spacing_per_m2) = (0.5e-3, 0.0);
+    (own.lateral_fwhm_m, own.lateral_depth_of_field_m) = (2.37e-3, 1.0);
+    let mut refused = 0;
+    for seed in 171..175 {
+        let phantom = Phantom { spread, stenoses: vec![(12.0, 19.7, 0.8)], ..straight(seed) };
+        let images = sweep(&phantom, 60, 0.5);
+        for (number, found) in segment(&images, &settings).iter().enumerate() {
+            let Ok(contour) = &found.lumen else {
+                refused += 1;
+                continue;
+            };
+            let at = contour.centre.vector() * 1e3;
+            let off = (at.y - phantom.across).hypot(at.z - phantom.depth);
+            assert!(off < 1.5, "seed {seed}, image {number}: {off:.1} mm off");
+        }
+    }
+    assert!(refused <= 5, "{refused} of 240");
+}
+
+#[test]
+fn what_a_sweep_begins_with_gives_way_to_the_longer_vessel_that_contradicts_it() {
+    let (phantom, elsewhere) = (straight(181), Phantom { across: 9.0, ..straight(182) });
+    let mut images = sweep(&phantom, 40, 0.6);
+    (0..3_u32).for_each(|i| images[i as usize] = elsewhere.bscan(u64::from(i), f64::from(i) * 0.6));
+    let found = segment(&images, &LumenSettings::default());
+    for image in &found[..3] {
+        let why = image.lumen.as_ref().expect_err("the vessel runs elsewhere");
+        assert_eq!(why.kind(), "away from its neighbours");
+    }
+    assert_eq!(found[3..].iter().filter(|found| found.lumen.is_ok()).count(), 37);
+}
+
+#[test]
 fn the_standard_deviation_of_a_point_is_what_it_is_off() {
     let cases =
         [straight(141), Phantom { echoes: (0.05, 0.8, 0.5), wall: 1.0, radius: 2.6, ..straight(142) }];
