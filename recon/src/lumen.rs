@@ -47,7 +47,8 @@ pub struct ImageLumen {
 /// The settings and images are taken as they are: [`reconstruct_lumen`](crate::reconstruct_lumen) checks them.
 pub fn segment(images: &[PlacedBScan], settings: &LumenSettings) -> Vec<ImageLumen> {
     let table = PowerOfGrey::new(settings.dynamic_range_db);
-    let look = Look { table: &table, settings, wall: WallPrior::unknown(settings.wall_thickness_m) };
+    let wall = WallPrior::unknown(settings.wall_thickness_m);
+    let look = Look { table: &table, settings, wall, last: false };
     let mut regions = track::follow(images, &table, settings);
     let mut borders = first_borders(images, &regions, &look);
     again::second_look(images, &look, &mut regions, &mut borders);
@@ -55,7 +56,7 @@ pub fn segment(images: &[PlacedBScan], settings: &LumenSettings) -> Vec<ImageLum
         // Before the beam's thickness is thought of, walls that run aslant look thick.
         let wall =
             if pass > 0 { wall_of(images, &borders).prior(settings.wall_thickness_m) } else { look.wall };
-        let look = Look { wall, ..look };
+        let look = Look { wall, last: pass + 1 == PASSES, ..look };
         let planes = beam::planes(images, &borders, &settings.point_spread);
         let inputs = images.par_iter().zip(&regions).zip(&planes);
         borders = inputs
@@ -76,7 +77,7 @@ pub fn segment(images: &[PlacedBScan], settings: &LumenSettings) -> Vec<ImageLum
         ImageLumen { number: image.bscan.number, lumen, others: Vec::new() }
     });
     let mut lumens: Vec<ImageLumen> = lumens.collect();
-    branches::in_sweep(images, &look, &mut lumens);
+    branches::in_sweep(images, &Look { last: true, ..look }, &mut lumens);
     lumens
 }
 
@@ -135,6 +136,8 @@ struct Look<'a> {
     table: &'a PowerOfGrey,
     settings: &'a LumenSettings,
     wall: WallPrior,
+    /// Whether what is fitted is fitted for the last time.
+    last: bool,
 }
 
 impl Look<'_> {
@@ -156,9 +159,9 @@ impl Look<'_> {
         let depth = setting.window_top_m + region.centre.1;
         let spread = &self.settings.point_spread;
         let sigma = (spread.lateral_m(depth, setting) / FWHM, spread.axial_fwhm_m / FWHM);
-        let (wall, sigma_sd) = (self.wall, self.settings.point_spread_sd);
+        let (wall, last, sigma_sd) = (self.wall, self.last, self.settings.point_spread_sd);
         let (bscan, table) = (&image.bscan, self.table);
-        fit::fit(&FitInput { bscan, table, region, sigma, sigma_sd, wall, planes, start })
+        fit::fit(&FitInput { bscan, table, region, sigma, sigma_sd, wall, planes, last, start })
     }
 
     /// The contour of a border that is one of a lumen.

@@ -67,7 +67,7 @@ impl Tracker {
 impl LumenFinder for Tracker {
     fn find(&mut self, image: &PlacedBScan) -> ImageLumen {
         let wall = WallPrior::unknown(self.settings.wall_thickness_m);
-        let look = Look { table: &self.table, settings: &self.settings, wall };
+        let look = Look { table: &self.table, settings: &self.settings, wall, last: true };
         let given = self.settings.seed.filter(|_| self.first).map(|seed| seed.place(image));
         self.first = false;
         let region = track::region(image, &self.table, &self.settings, &self.main.trail, given);

@@ -51,6 +51,8 @@ const CELL: (f64, f64) = (0.8, 1.2);
 /// Steps end when no harmonic moves farther (m), or after so many. Directions are tabulated, so that harmonics sway by
 /// some 10 um in the end; speckle moves them by five times that.
 const SETTLED_M: f64 = 20e-6;
+/// The same of a fit that another one goes on from.
+const NEARLY_SETTLED_M: f64 = 40e-6;
 const MOST_STEPS: usize = 8;
 
 /// Covariance of the border's harmonics (m2).
@@ -72,6 +74,9 @@ pub(crate) struct FitInput<'a> {
     pub(crate) wall: WallPrior,
     /// What the beam's thickness takes in.
     pub(crate) planes: &'a [Plane],
+    /// Whether it is the last fit of this image. Before that, what the point spread's error does is not asked, and the
+    /// border may sway more.
+    pub(crate) last: bool,
     /// Where it begins.
     pub(crate) start: Start<'a>,
 }
@@ -198,13 +203,14 @@ struct Model<'a> {
 /// Fits the border.
 pub(crate) fn fit(input: &FitInput<'_>) -> Result<Border, NoLumen> {
     let mut model = Model::new(input)?;
+    let settled_m = if input.last { SETTLED_M } else { NEARLY_SETTLED_M };
     for _ in 0..MOST_STEPS {
         let (matrix, gradient, gains) = model.normal_equations();
         let solved = matrix.cholesky().ok_or(NoLumen::Unsettled)?;
         let step = limited(solved.solve(&gradient));
         model.unknowns += step;
         model.gains.follow(&step, &gains);
-        if step.rows(RADIUS, BORDER).amax() < SETTLED_M {
+        if step.rows(RADIUS, BORDER).amax() < settled_m {
             break;
         }
     }
@@ -293,7 +299,7 @@ impl<'a> Model<'a> {
         let (matrix, ..) = self.normal_equations();
         let misfit = equations::misfit(&self.lattice, &self.fields, &self.weights);
         let inverse = matrix.cholesky()?.inverse();
-        let spread = self.spread_sd(&inverse);
+        let spread = if self.input.last { self.spread_sd(&inverse) } else { 0.0 };
         let own = equations::noise(&self.lattice, &mut self.fields.clone(), &self.weights, self.input.sigma);
         let (random, common) = self.covariances(&inverse, own);
         self.unknowns += self.bias(&inverse, &random);
