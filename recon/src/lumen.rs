@@ -200,6 +200,7 @@ fn contour(image: &PlacedBScan, border: &Border, region: &Region) -> Contour {
         points_sd_mm: (0..RAYS).map(|ray| border.sd_at(angle(ray)) * 1e3).collect(),
         sd_mm: border.sd * 1e3,
         common_sd_mm: border.common_sd * 1e3,
+        common_size_sd_mm: border.common_size_sd * 1e3,
     };
     let contour = Contour::of(image, &places, uncertainty);
     let own = places.len() as f64;

@@ -130,6 +130,7 @@ impl BentVessel {
             sd_mm: 0.03,
             points_sd_mm: vec![0.1; places.len()],
             common_sd_mm: 0.05,
+            common_size_sd_mm: 0.05,
             vessel: 0,
             branches: false,
             wall_mm: 0.8,

@@ -266,6 +266,7 @@ fn contour(image: &PlacedBScan, outline: &[(f64, f64)], shear: f64, sd_mm: f64) 
         sd_mm,
         points_sd_mm: vec![sd_mm * 10.0_f64.sqrt(); pixels.len()],
         common_sd_mm: 0.0,
+        common_size_sd_mm: 0.0,
         vessel: 0,
         pixels,
         branches: false,

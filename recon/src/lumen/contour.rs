@@ -26,6 +26,8 @@ pub struct Contour {
     /// Standard deviation of what moves all points of this image and its neighbours together (mm): the point spread
     /// that was assumed, and the model of the wall. It does not become less with more images.
     pub common_sd_mm: f64,
+    /// Standard deviation of what moves their mean radii together (mm): most of what is shared leaves the size alone.
+    pub common_size_sd_mm: f64,
     /// Which vessel it is: 0 for the one followed first; a branch keeps its own number from image to image.
     pub vessel: usize,
     /// Whether the dark region runs on beyond it: a branch, or a vein that lies against it.
@@ -74,7 +76,8 @@ impl Contour {
         }
         // A point's own error and its neighbours' agree over about a tenth of the circumference.
         let mean = points_sd_mm.iter().map(|sd| sd * sd).sum::<f64>() / points_sd_mm.len() as f64;
-        let uncertainty = Uncertainty { points_sd_mm, sd_mm: (mean / 10.0).sqrt(), common_sd_mm };
+        let sd_mm = (mean / 10.0).sqrt();
+        let uncertainty = Uncertainty { points_sd_mm, sd_mm, common_sd_mm, common_size_sd_mm: common_sd_mm };
         Ok(Self::of(image, &places, uncertainty))
     }
 
@@ -93,6 +96,7 @@ impl Contour {
             sd_mm: uncertainty.sd_mm,
             points_sd_mm: uncertainty.points_sd_mm,
             common_sd_mm: uncertainty.common_sd_mm,
+            common_size_sd_mm: uncertainty.common_size_sd_mm,
             vessel: 0,
             branches: false,
             wall_mm: 0.0,
@@ -111,6 +115,7 @@ pub(super) struct Uncertainty {
     pub(super) points_sd_mm: Vec<f64>,
     pub(super) sd_mm: f64,
     pub(super) common_sd_mm: f64,
+    pub(super) common_size_sd_mm: f64,
 }
 
 /// Area and centre of gravity of a closed line (Green's theorem). A line without area has its mean as centre.

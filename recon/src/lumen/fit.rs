@@ -129,8 +129,9 @@ pub(crate) struct Border {
     pub(crate) sd: f64,
     /// Covariance of the harmonics (m2).
     covariance: Harmonics,
-    /// Standard deviation of what an error of the point spread does to the border (m).
+    /// Standard deviation of what images of the same wall share (m): of a point, and of the mean radius.
     pub(crate) common_sd: f64,
+    pub(crate) common_size_sd: f64,
     /// Part of the circumference where a wall is seen (0 to 1).
     pub(crate) walled: f64,
     /// Mean square of how far cells are off the prediction, in standard deviations: about one where a wall round a
@@ -299,8 +300,11 @@ impl<'a> Model<'a> {
         let (matrix, ..) = self.normal_equations();
         let misfit = equations::misfit(&self.lattice, &self.fields, &self.weights);
         let inverse = matrix.cholesky()?.inverse();
-        let spread = if self.input.last { self.spread_sd(&inverse) } else { 0.0 };
-        let own = equations::noise(&self.lattice, &mut self.fields.clone(), &self.weights, self.input.sigma);
+        let (spread, spread_size) = if self.input.last { self.spread_sd(&inverse) } else { (0.0, 0.0) };
+        // Speckle that is smoother than fully developed speckle, as machines draw it, has less to say and less to shake:
+        // the dispersion of a quasi-score (McCullagh 1983).
+        let own = equations::noise(&self.lattice, &mut self.fields.clone(), &self.weights, self.input.sigma)
+            * misfit;
         let (random, common) = self.covariances(&inverse, own);
         self.unknowns += self.bias(&inverse, &random);
         let variance = inverse[(THICKNESS, THICKNESS)];
@@ -312,6 +316,7 @@ impl<'a> Model<'a> {
             sd: random[(0, 0)].sqrt(),
             covariance: random,
             common_sd: mean_square(|k| common[(k, k)]).sqrt().hypot(spread),
+            common_size_sd: common[(0, 0)].sqrt().hypot(spread_size),
             walled: self.sight.walled,
             misfit,
             wall: self.unknowns[THICKNESS].exp(),
@@ -357,17 +362,18 @@ impl<'a> Model<'a> {
         inverse * self.answer(Residual::Smeared(&smeared))
     }
 
-    /// How far the border moves, root mean square over the circumference, when the point spread is wider by its
-    /// standard deviation: that of the power solves the equation of heat.
-    fn spread_sd(&self, covariance: &Matrix) -> f64 {
+    /// How far the border moves, root mean square over the circumference, and how much the mean radius changes when the
+    /// point spread is wider by its standard deviation: that of the power solves the equation of heat.
+    fn spread_sd(&self, covariance: &Matrix) -> (f64, f64) {
         let cells = |sigma: f64, cell: f64| (self.input.sigma_sd * (sigma / cell).powi(2) / 2.0) as f32;
         let (x, y) =
             (cells(self.input.sigma.0, self.lattice.cell.0), cells(self.input.sigma.1, self.lattice.cell.1));
         let moved = |x: f32, y: f32| {
             let by = covariance * self.answer(Residual::Wider { x, y });
-            mean_square(|k| by[k].powi(2))
+            (mean_square(|k| by[k].powi(2)), by[0])
         };
-        (moved(x, 0.0) + moved(0.0, y)).sqrt()
+        let ((point_x, size_x), (point_y, size_y)) = (moved(x, 0.0), moved(0.0, y));
+        ((point_x + point_y).sqrt(), size_x.hypot(size_y))
     }
 }
 

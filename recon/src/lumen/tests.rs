@@ -156,6 +156,28 @@ fn the_standard_deviation_of_a_point_is_what_it_is_off() {
 }
 
 #[test]
+fn the_standard_deviation_of_a_size_is_what_it_scatters_by_and_what_is_shared_covers_its_mean() {
+    let (mut scatter, mut stated, mut sweeps) = (0.0, 0.0, 0.0);
+    for seed in 0..4 {
+        let phantom = straight(900 + seed);
+        let found = segment(&sweep(&phantom, 40, 3.0), &LumenSettings::default());
+        let contours: Vec<_> = found.iter().map(|found| found.lumen.as_ref().expect("a lumen")).collect();
+        let off: Vec<f64> = contours.iter().map(|contour| contour.radius_mm() - phantom.radius).collect();
+        let middle = mean(&off);
+        let shared = contours[0].common_size_sd_mm;
+        assert!(
+            middle.abs() < 1.96 * shared.hypot(contours[0].sd_mm / 40_f64.sqrt()),
+            "{middle} mm, {shared}"
+        );
+        scatter += off.iter().map(|off| (off - middle).powi(2)).sum::<f64>() / 39.0;
+        stated += contours.iter().map(|contour| contour.sd_mm.powi(2)).sum::<f64>() / 40.0;
+        sweeps += 1.0;
+    }
+    let [scatter, stated] = [scatter, stated].map(|sum| f64::sqrt(sum / sweeps));
+    assert!((0.75..1.1).contains(&(scatter / stated)), "{scatter} mm, {stated} stated");
+}
+
+#[test]
 fn lateral_walls_are_less_sure_than_axial_ones() {
     let image = straight(151).bscan(0, 0.0);
     let found = segment(std::slice::from_ref(&image), &LumenSettings::default());

@@ -26,7 +26,7 @@ pub(crate) struct Station {
     pub(crate) moved_m: [f64; PARAMETERS],
     /// Tangent of the angle between the image's normal and the vessel.
     pub(crate) oblique: f64,
-    /// Standard deviation of what all contours near here share (m).
+    /// Standard deviation of what the sizes of all contours near here share (m).
     pub(crate) border_sd_m: f64,
     /// Mean distance of the images (m).
     pub(crate) spacing_m: f64,
@@ -77,7 +77,7 @@ fn cut(shown: &[Shown<'_>], i: usize, line: &Centreline) -> Option<Cut> {
         normal: image.world_from_image.z_axis().vector(),
         along: near.tangent.vector(),
         answers: answers(shown, i, contour)?,
-        border_sd_m: 1e-3 * contour.common_sd_mm,
+        border_sd_m: 1e-3 * contour.common_size_sd_mm,
         // What the skin does to the probe is negative along its z where the probe presses.
         force_n: image.wrench.map(|wrench| -wrench.force.z).filter(|force| force.is_finite()),
     })
