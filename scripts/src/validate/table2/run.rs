@@ -40,7 +40,7 @@ impl Outcome {
     /// Of one seed; whatever goes wrong on the way is part of it.
     pub(super) fn of(row: &Row, seed: u64, out: &Path) -> Self {
         // The machine stamps its images up to 40 ms early or late, and nobody has told.
-        let row = row.clone().late_by((seed.wrapping_mul(37) % 81) as f64 - 40.0);
+        let row = row.clone().late_by((seed.wrapping_mul(37) % 81) as f64 - 40.0).walled_for(seed);
         let mut outcome = Self::default();
         if let Err(error) = outcome.fill(&row, seed, out) {
             outcome.failed = Some(error.to_string());
