@@ -1,6 +1,6 @@
 """The same work by other programs: pixels into voxels, holes filled, an image cut out.
 
-    python3 benches/peers/volume.py              from anywhere; needs a network for PyPI
+    python3 benches/peers/volume.py  from anywhere; needs a network for PyPI
 
 The geometry is that of `recon/benches/volume.rs`. What there is on PyPI: no program for freehand volumes (IGSIO's, which
 PLUS and 3D Slicer use, is not there; its figures in docs and README are quoted, from another machine), so pixels go into
@@ -10,35 +10,13 @@ Installs what it needs into target/peers.
 """
 
 import os
-import subprocess
-import sys
 import time
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-VENV = ROOT / "target" / "peers"
+from environment import least, with_packages
+
 NEEDS = ["numpy==2.4.6", "scipy==1.17.1", "SimpleITK==2.5.7", "vtk==9.7.2"]
 IMAGES = 12
 SIZE = (220, 165, 30)  # x, y, z voxels of 0.3 mm
-
-
-def in_own_environment():
-    python = VENV / "bin" / "python"
-    if Path(sys.prefix).resolve() == VENV.resolve():
-        return
-    if not python.exists():
-        subprocess.run([sys.executable, "-m", "venv", str(VENV)], check=True)
-    subprocess.run([str(python), "-m", "pip", "install", "-q", *NEEDS], check=True)
-    os.execv(str(python), [str(python), __file__, *sys.argv[1:]])
-
-
-def least(work, runs=3):
-    times = []
-    for _ in range(runs):
-        begun = time.process_time()
-        work()
-        times.append(time.process_time() - begun)
-    return min(times)
 
 
 def places(numpy, image):
@@ -87,7 +65,7 @@ def fill(numpy):
         nearest = ndimage.distance_transform_edt(unseen, return_distances=False, return_indices=True)
         return grey[tuple(nearest)]
 
-    return least(work, 1) * 131.2e6 / grey.size
+    return least(work, 1)[1] * 131.2e6 / grey.size
 
 
 def cuts(numpy):
@@ -105,7 +83,7 @@ def cuts(numpy):
     grid.SetDirection(turn)
     plain = SimpleITK.Transform(3, SimpleITK.sitkIdentity)
     SimpleITK.ProcessObject.SetGlobalDefaultNumberOfThreads(1)
-    by_simpleitk = least(lambda: SimpleITK.Resample(volume, grid, plain, SimpleITK.sitkLinear), 5)
+    by_simpleitk = least(lambda: SimpleITK.Resample(volume, grid, plain, SimpleITK.sitkLinear), 5)[1]
 
     image = vtk.vtkImageData()
     image.SetDimensions(grey.shape[::-1])
@@ -126,16 +104,16 @@ def cuts(numpy):
         reslice.Modified()
         reslice.Update()
 
-    return by_simpleitk, least(by_vtk, 5)
+    return by_simpleitk, least(by_vtk, 5)[1]
 
 
 def main():
-    in_own_environment()
+    with_packages(NEEDS)
     import numpy
 
     pixels = ((numpy.arange(640 * 480, dtype=numpy.uint64) * 2_654_435_761 % 2**32) >> 24).astype(float)
-    print(f"numpy bincount, nearest, mean:   {least(lambda: nearest(numpy, pixels)) / IMAGES * 1e3:7.1f} ms an image")
-    print(f"numpy bincount, linear, mean:    {least(lambda: linear(numpy, pixels), 2) / IMAGES * 1e3:7.1f} ms an image")
+    print(f"numpy bincount, nearest, mean:   {least(lambda: nearest(numpy, pixels), 3)[1] / IMAGES * 1e3:7.1f} ms an image")
+    print(f"numpy bincount, linear, mean:    {least(lambda: linear(numpy, pixels), 2)[1] / IMAGES * 1e3:7.1f} ms an image")
     by_simpleitk, by_vtk = cuts(numpy)
     print(f"SimpleITK resample, 640 x 480:   {by_simpleitk * 1e3:7.1f} ms, one thread, linear")
     print(f"VTK image reslice, 640 x 480:    {by_vtk * 1e3:7.1f} ms, one thread, linear")

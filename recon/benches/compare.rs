@@ -1,7 +1,7 @@
 //! Exact distances: 100,000 points to a surface of 100,000 triangles, the tree built each time, on one thread.
 //!
 //! `PROBEPATH_BENCH_FILES=DIR cargo bench -p probepath-recon --bench compare -- --test` also writes the points and the
-//! surface, which `benches/peers/compare_peers.py` gives to other programs.
+//! surface, which `benches/peers/compare.py` gives to other programs.
 #![allow(missing_docs, reason = "criterion_group! writes functions without documentation")]
 #![expect(clippy::expect_used, reason = "a benchmark may stop at the first surprise")]
 

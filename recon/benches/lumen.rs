@@ -2,7 +2,7 @@
 //! once, as `segment` does it, by image.
 //!
 //! With PROBEPATH_LUMEN_IMAGES=FOLDER it also writes the images (PGM) and the true areas (truth.csv) there, for
-//! `benches/peers/lumen_peers.py`.
+//! `benches/peers/lumen.py`.
 #![allow(missing_docs, reason = "criterion_group! writes functions without documentation")]
 #![expect(clippy::expect_used, reason = "a benchmark may stop at the first surprise")]
 

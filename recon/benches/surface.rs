@@ -1,6 +1,6 @@
 //! From contours (300 x 64) to the closed surface, the centreline and 300 sections; and what a view costs while scanning.
 //!
-//! `benches/peers/surface_vtk.py` does the cutting alone with VTK, on a surface of the same size.
+//! `benches/peers/surface.py` does the cutting alone with VTK, on a surface of the same size.
 #![allow(missing_docs, reason = "criterion_group! writes functions without documentation")]
 #![expect(clippy::expect_used, reason = "a benchmark may stop at the first surprise")]
 

@@ -1,6 +1,6 @@
 """The same lumens by other programs: fast marching on the grey levels of 640 x 480 B-scans.
 
-    python3 benches/peers/lumen_peers.py              from anywhere; needs cargo and a network for PyPI
+    python3 benches/peers/lumen.py  from anywhere; needs cargo and a network for PyPI
 
 Has our benchmark write its images and their true areas and run, then gives each image to SimpleITK's fast marching and to
 scikit-fmm, as they are used for this: a speed that falls with the gradient of the smoothed picture, a front from the
@@ -12,33 +12,11 @@ Installs what it needs into target/peers.
 import csv
 import os
 import subprocess
-import sys
-import time
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-VENV = ROOT / "target" / "peers"
+from environment import ROOT, least, with_packages
+
 NEEDS = ["numpy==2.4.6", "SimpleITK==2.5.7", "scikit-fmm==2025.6.23"]
 FILES = ROOT / "target" / "bench-lumen"
-
-
-def in_own_environment():
-    python = VENV / "bin" / "python"
-    if Path(sys.prefix).resolve() == VENV.resolve():
-        return
-    if not python.exists():
-        subprocess.run([sys.executable, "-m", "venv", str(VENV)], check=True)
-    subprocess.run([str(python), "-m", "pip", "install", "-q", *NEEDS], check=True)
-    os.execv(str(python), [str(python), __file__, *sys.argv[1:]])
-
-
-def least(work, times=5):
-    seconds, answer = [], None
-    for _ in range(times):
-        start = time.perf_counter()
-        answer = work()
-        seconds.append(time.perf_counter() - start)
-    return min(seconds), answer
 
 
 def ours():
@@ -92,7 +70,7 @@ def judged(name, march):
 
     seconds, arrivals, areas, pixel = [], [], [], 0.0
     for pixels, area, seed, spacing in images():
-        took, arrival = least(lambda: march(pixels, seed, spacing))
+        took, _, arrival = least(lambda: march(pixels, seed, spacing))
         seconds.append(took)
         arrivals.append(np.sort(np.asarray(arrival, dtype=float).ravel()))
         areas.append(area)
@@ -108,7 +86,7 @@ def judged(name, march):
 
 
 if __name__ == "__main__":
-    in_own_environment()
+    with_packages(NEEDS)
     ours()
     judged("SimpleITK fast marching, one thread", with_simpleitk)
     judged("scikit-fmm", with_scikit_fmm)

@@ -1,6 +1,6 @@
 """The same distances by other programs: 100,000 points to a surface of 100,000 triangles.
 
-    python3 benches/peers/compare_peers.py            from anywhere; needs cargo and a network for PyPI
+    python3 benches/peers/compare.py  from anywhere; needs cargo and a network for PyPI
 
 Writes points and surface with our benchmark, runs it, then Open3D (on one thread and on all), VTK and trimesh, each
 with the time for its own tree inside. The least of five runs, by the clock and in processor time (which does not count
@@ -12,33 +12,11 @@ import json
 import os
 import subprocess
 import sys
-import time
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-VENV = ROOT / "target" / "peers"
+from environment import ROOT, least, with_packages
+
 NEEDS = ["numpy==2.4.6", "open3d==0.20.0", "vtk==9.7.2", "trimesh==5.2.0", "rtree==1.4.1", "scipy==1.17.1"]
 FILES = ROOT / "target" / "bench-compare"
-
-
-def in_own_environment():
-    python = VENV / "bin" / "python"
-    if Path(sys.prefix).resolve() == VENV.resolve():
-        return
-    if not python.exists():
-        subprocess.run([sys.executable, "-m", "venv", str(VENV)], check=True)
-    subprocess.run([str(python), "-m", "pip", "install", "-q", *NEEDS], check=True)
-    os.execv(str(python), [str(python), __file__, *sys.argv[1:]])
-
-
-def least(work, times=5):
-    seconds, worked, answer = [], [], None
-    for _ in range(times):
-        start, begun = time.perf_counter(), time.process_time()
-        answer = work()
-        seconds.append(time.perf_counter() - start)
-        worked.append(time.process_time() - begun)
-    return min(seconds), min(worked), answer
 
 
 def ply(path):
@@ -104,7 +82,7 @@ def trimesh(points, triangles, vertices):
 
 
 def main():
-    in_own_environment()
+    with_packages(NEEDS)
     import numpy as np
 
     cargo = ["cargo", "bench", "-q", "-p", "probepath-recon", "--bench", "compare", *sys.argv[1:], "--"]

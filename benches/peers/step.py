@@ -1,31 +1,16 @@
 """What stands beside the step's bench: Pinocchio's kinematics of the same arm, and OSQP on a program of the same size.
 
-    python teach-replay/benches/peers_step.py
+    python3 benches/peers/step.py  from anywhere; needs a network for PyPI
 
-Installs what it needs (pin 4.1.0, osqp 1.1.3) into target/peers once. Both are called from Python, so the time of an
+Installs what it needs into target/peers. Both are called from Python, so the time of an
 empty call of the same library is printed beside and is to be taken off.
 """
 
-import pathlib
-import subprocess
-import sys
 import time
-import venv
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-HOME = ROOT / "target" / "peers"
-NEEDS = ["pin==4.1.0", "osqp==1.1.3", "numpy", "scipy"]
+from environment import ROOT, with_packages
 
-
-def in_own_environment():
-    """Starts itself again with the environment's Python, made when it is not there."""
-    python = HOME / "bin" / "python"
-    if pathlib.Path(sys.prefix) == HOME:
-        return
-    if not python.exists():
-        venv.create(HOME, with_pip=True)
-        subprocess.check_call([python, "-m", "pip", "install", "-q", *NEEDS])
-    sys.exit(subprocess.call([python, __file__]))
+NEEDS = ["pin==4.1.0", "osqp==1.1.3", "numpy==2.4.6", "scipy==1.17.1"]
 
 
 def percentiles(name, call, count=20_000):
@@ -80,6 +65,6 @@ def osqp_program():
 
 
 if __name__ == "__main__":
-    in_own_environment()
+    with_packages(NEEDS)
     pinocchio()
     osqp_program()
