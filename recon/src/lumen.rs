@@ -10,6 +10,7 @@ mod fit;
 mod refusal;
 mod region;
 mod seed;
+mod shadow;
 mod track;
 mod wall;
 

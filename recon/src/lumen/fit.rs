@@ -22,8 +22,10 @@ use probepath_us_capture::BScan;
 
 use super::NoLumen;
 use super::region::{RAYS, Region, angle};
+use super::shadow::Shadows;
 use super::wall::{Told, WallPrior};
 use crate::patch::PowerOfGrey;
+use crate::settings::FWHM;
 use equations::{GainStep, Gains, Matrix, RADIUS, Residual, SPANS, UNKNOWNS, Vector, Weights, equations};
 use fields::{BY_THICKNESS, Fields, LUMEN, Scene, TISSUE, WALL};
 use lattice::{BINS, Lattice, Wanted, direction};
@@ -390,6 +392,7 @@ fn lattice(input: &FitInput<'_>, start: &[f64; BINS], sigma: (f64, f64)) -> Resu
         centre: input.region.centre,
         half: (far + 3.5 * sigma.0, far + 3.5 * sigma.1),
         cell: (CELL.0 * sigma.0, CELL.1 * sigma.1),
+        shadows: &Shadows::below(input.bscan, input.table, input.region.centre.1, FWHM * input.sigma.0),
     };
     let outside = NoLumen::OutsidePicture { x_mm: wanted.centre.0 * 1e3, y_mm: wanted.centre.1 * 1e3 };
     Lattice::new(input.bscan, input.table, &wanted).ok_or(outside)

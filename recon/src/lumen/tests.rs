@@ -84,6 +84,19 @@ fn what_a_shadow_hides_is_refused_with_a_reason_or_right() {
 }
 
 #[test]
+fn a_lumen_a_third_of_which_lies_in_a_shadow_has_its_whole_area() {
+    for (seed, across, loss_db) in
+        [(131, (1.5, 4.5), 20.0), (133, (1.0, 4.0), 20.0), (134, (-4.5, -1.5), 15.0)]
+    {
+        let shadow = Some(Shadow { across, below: 10.0, loss_db });
+        let phantom = Phantom { shadow, ..straight(seed) };
+        let images = sweep(&phantom, 12, 0.7);
+        let errors = area_errors(&phantom, &images, &segment(&images, &LumenSettings::default()));
+        assert!(errors.len() >= 11 && mean(&errors).abs() < 0.05, "{across:?}: {errors:.2?}");
+    }
+}
+
+#[test]
 fn a_vessel_nearly_closed_is_right_or_refused_and_found_again_behind_it() {
     let phantom = Phantom { stenoses: vec![(16.0, 16.0, 0.96)], ..straight(131) };
     let images = sweep(&phantom, 33, 1.0);

@@ -5,6 +5,7 @@ use probepath_frames::Point;
 use probepath_us_capture::PlacedBScan;
 
 use super::region::{Region, grow};
+use super::shadow::Shadows;
 use super::{NoLumen, seed};
 use crate::LumenSettings;
 use crate::patch::{Patch, PowerOfGrey};
@@ -85,9 +86,11 @@ pub(crate) fn grown(
 ) -> Result<Region, NoLumen> {
     let half = WINDOW * settings.radius_range_m.1;
     let outside = NoLumen::OutsidePicture { x_mm: place.0 * 1e3, y_mm: place.1 * 1e3 };
-    let patch = Patch::around(&image.bscan, table, place, (half, half), (CELL_M, CELL_M)).ok_or(outside)?;
+    let mut patch =
+        Patch::around(&image.bscan, table, place, (half, half), (CELL_M, CELL_M)).ok_or(outside)?;
     let spread = &settings.point_spread;
     let lateral = spread.lateral_m(image.bscan.setting.window_top_m + place.1, &image.bscan.setting);
+    Shadows::below(&image.bscan, table, place.1, lateral).fill(&mut patch);
     let region = grow(&patch, place, (lateral, spread.axial_fwhm_m))?;
     let by = (region.centre.0 - place.0).hypot(region.centre.1 - place.1);
     if by > 0.6 * settings.radius_range_m.1 { Err(NoLumen::Jump { by_mm: by * 1e3 }) } else { Ok(region) }

@@ -2,6 +2,7 @@
 
 use probepath_us_capture::BScan;
 
+use crate::lumen::shadow::Shadows;
 use crate::patch::PowerOfGrey;
 
 /// Directions that a cell may lie in; what changes round the vessel is tabulated for each.
@@ -24,10 +25,12 @@ pub(super) struct Lattice {
 }
 
 /// What a lattice should be like (m).
-pub(super) struct Wanted {
+pub(super) struct Wanted<'a> {
     pub(super) centre: (f64, f64),
     pub(super) half: (f64, f64),
     pub(super) cell: (f64, f64),
+    /// What is not looked at.
+    pub(super) shadows: &'a Shadows,
 }
 
 /// Cells along one axis.
@@ -62,7 +65,7 @@ impl Axis {
 
 impl Lattice {
     /// The cells round a centre; nothing when hardly any is in the picture.
-    pub(super) fn new(bscan: &BScan, table: &PowerOfGrey, wanted: &Wanted) -> Option<Self> {
+    pub(super) fn new(bscan: &BScan, table: &PowerOfGrey, wanted: &Wanted<'_>) -> Option<Self> {
         let spacing = bscan.setting.spacing;
         let x = Axis::new(wanted.centre.0, wanted.half.0, wanted.cell.0, spacing.x_m, bscan.width())?;
         let y = Axis::new(wanted.centre.1, wanted.half.1, wanted.cell.1, spacing.y_m, bscan.height())?;
@@ -82,7 +85,16 @@ impl Lattice {
         };
         lattice.place(x.first, y.first);
         lattice.look(bscan, table, &x, &y)?;
+        let (first, step) = (wanted.centre.0 + x.first, lattice.cell.0);
+        lattice.leave_out(|column| wanted.shadows.cover(first + column as f64 * step));
         Some(lattice)
+    }
+
+    /// Does not look at some columns.
+    fn leave_out(&mut self, hidden: impl Fn(usize) -> bool) {
+        for column in (0..self.columns).filter(|column| hidden(*column)) {
+            self.used.iter_mut().skip(column).step_by(self.columns).for_each(|used| *used = 0.0);
+        }
     }
 
     /// Looks only at what is nearer to the centre than this (m), direction by direction.

@@ -8,12 +8,14 @@ const BINS_A_SECTOR: usize = BINS / SECTORS;
 /// Distances that are averaged over (m), and how far out a wall is looked for.
 const RING_M: f32 = 0.3e-3;
 const RINGS: usize = 14;
+/// When the wall is seen in so many sectors, those that a shadow hides are not held against it.
+const LEAST_SEEN: usize = 11;
 
 /// How well the wall is seen in every direction.
 pub(super) struct Sight {
     /// 0 where there is none, 1 where it is plain.
     pub(super) trust: [f32; BINS],
-    /// Part of the circumference where it is seen.
+    /// Part of the circumference where it is seen, of what can be seen of it.
     pub(super) walled: f64,
     /// How far outward of `inside` it rises to half its brightness (m), where it is seen.
     rise: [Option<f32>; SECTORS],
@@ -31,11 +33,16 @@ impl Sight {
         });
         // The brightest of a dozen rings is some 4 dB above the mean by speckle alone.
         let trust = |bin: usize| ((decibel[bin / BINS_A_SECTOR] - 7.0) / 5.0).clamp(0.02, 1.0);
+        let shown = peaks.iter().filter(|&&peak| peak > 0.0).count();
         let seen = decibel.iter().filter(|&&db| db > 9.0).count();
         let rise = |sector: usize| (decibel[sector] > 9.0).then(|| rise(&rings[sector]));
         Self {
             trust: std::array::from_fn(trust),
-            walled: seen as f64 / SECTORS as f64,
+            walled: if seen >= LEAST_SEEN {
+                seen as f64 / shown as f64
+            } else {
+                seen as f64 / SECTORS as f64
+            },
             rise: std::array::from_fn(rise),
         }
     }
