@@ -183,15 +183,19 @@ impl Look<'_> {
             return Err(NoLumen::Misfit { times: border.misfit });
         }
         let sd_mm = contour.points_sd_mm.iter().copied().fold(0.0, f64::max);
-        if sd_mm > MOST_UNSURE_MM + 0.1 * radius {
+        let part = if border.shaded { MOST_UNSURE_SHADED } else { MOST_UNSURE };
+        if sd_mm > MOST_UNSURE_MM + part * radius {
             return Err(NoLumen::Unsure { sd_mm });
         }
         Ok(contour)
     }
 }
 
-/// A border that is less sure than this (mm), and a tenth of the radius, somewhere is not given.
+/// A border that is less sure than this (mm), and a part of the radius, somewhere is not given. Where a shadow is known to
+/// hide the wall, its standard deviation says so, and the surface weighs it accordingly.
 const MOST_UNSURE_MM: f64 = 0.3;
+const MOST_UNSURE: f64 = 0.1;
+const MOST_UNSURE_SHADED: f64 = 0.25;
 /// What a wall round a lumen cannot be by speckle: 0.7 to 0.95 are usual, wrong borders are above 1.2.
 const MOST_MISFIT: f64 = 1.15;
 
