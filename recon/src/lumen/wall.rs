@@ -14,7 +14,7 @@ use super::fit::Border;
 const UNKNOWN: f64 = 0.5;
 /// How much it changes along one vessel before images say otherwise, likewise; and as how many images that counts.
 const ALONG: f64 = 0.2;
-const ALONG_COUNTS: f64 = 2.0;
+const ALONG_COUNTS: f64 = 1.0;
 /// Thinner and thicker than any artery's wall (m).
 const THINNEST_M: f64 = 0.15e-3;
 const THICKEST_M: f64 = 4e-3;

@@ -135,6 +135,7 @@ mod tests {
             at: 0.0,
             means: [1.0, 0.0, 0.0],
             own_sd: 1.0,
+            speckle_part: 1.0,
             common_sd: 0.0,
             turn: 0,
             points: (0..400).map(|_| sample()).collect(),

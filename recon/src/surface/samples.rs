@@ -23,6 +23,8 @@ pub(crate) struct Samples {
     pub means: [f64; 3],
     /// Standard deviation of its size (m).
     pub own_sd: f64,
+    /// What speckle has of the variance of its points; the rest is the pose's, which leaves the size alone.
+    pub speckle_part: f64,
     /// Standard deviation of what it shares with all others (m).
     pub common_sd: f64,
     /// Its place among the contours, in the order of their images.
@@ -74,20 +76,22 @@ fn of(line: &Centreline, contour: &Contour, turn: usize, step: usize) -> Option<
     let own_sd = (contour.sd_mm * 1e-3).hypot(POSE_SD_M);
     let mut near = line.nearest_m(&contour.centre.vector())?;
     let mut points = Vec::with_capacity(contour.world.len() / step + 1);
-    let mut sums = [0.0; 4];
+    let mut sums = [0.0; 5];
     for (k, place) in contour.world.iter().enumerate().step_by(step) {
-        let (sample, across) = sample(line, place, near, sd(contour, k))?;
+        let sd = sd(contour, k);
+        let (sample, across) = sample(line, place, near, sd)?;
         near = sample.at;
-        let values = [sample.r, across.0, across.1, sample.at];
+        let speckle_part = (1.0 - (POSE_SD_M / sd).powi(2)).max(0.0);
+        let values = [sample.r, across.0, across.1, sample.at, speckle_part];
         sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
         points.push(sample);
     }
     let count = points.len() as f64;
     // A contour has eleven free numbers, however many points draw it.
     points.iter_mut().for_each(|point| point.weight *= (AROUND as f64 / count).min(1.0));
-    let [r, up, side, at] = sums.map(|sum| sum / count);
+    let [r, up, side, at, speckle_part] = sums.map(|sum| sum / count);
     let common_sd = contour.common_sd_mm * 1e-3;
-    Some(Samples { at, means: [r, up, side], own_sd, common_sd, turn, points })
+    Some(Samples { at, means: [r, up, side], own_sd, speckle_part, common_sd, turn, points })
         .filter(|samples| samples.at.is_finite() && r.is_finite() && own_sd.is_finite())
 }
 

@@ -35,6 +35,8 @@ pub(crate) type SectionCovariance = SMatrix<f64, AROUND, AROUND>;
 pub(crate) struct Tube {
     shape: Shape,
     covariance: InBand,
+    /// What speckle has of it.
+    speckle_part: f64,
     common_sd_m: f64,
 }
 
@@ -107,9 +109,10 @@ impl Tube {
     /// Fitted to contours that are sorted by their places.
     pub(crate) fn fit(contours: &[Samples]) -> Result<Self, ReconError> {
         let (shape, factor) = solve(contours).ok_or(NO_FIT)?;
-        let common: f64 = contours.iter().map(|contour| contour.common_sd).sum();
-        let common_sd_m = common / contours.len().max(1) as f64;
-        Ok(Self { shape, covariance: factor.inverse_in_band(), common_sd_m })
+        let mean =
+            |of: fn(&Samples) -> f64| contours.iter().map(of).sum::<f64>() / contours.len().max(1) as f64;
+        let (common_sd_m, speckle_part) = (mean(|c| c.common_sd), mean(|c| c.speckle_part));
+        Ok(Self { shape, covariance: factor.inverse_in_band(), speckle_part, common_sd_m })
     }
 
     /// The same without the covariance.
@@ -143,11 +146,13 @@ impl Tube {
         sum
     }
 
-    /// Area of the section at a length and its standard deviation (m2).
+    /// Area of the section at a length and its standard deviation (m2): what speckle leaves open. A pose moves a contour's
+    /// place and not its size.
     pub(crate) fn area(&self, at: f64) -> (f64, f64) {
         let mut slope = SVector::from(self.section(at)) * std::f64::consts::PI;
         slope[0] *= 2.0;
-        (self.shape.area(at), slope.dot(&(self.covariance(at) * slope)).max(0.0).sqrt())
+        let variance = self.speckle_part * slope.dot(&(self.covariance(at) * slope));
+        (self.shape.area(at), variance.max(0.0).sqrt())
     }
 
     /// The points of the surface round a point of the centreline.
