@@ -13,6 +13,12 @@ pub trait BScanSource {
     /// When the stream is broken: it ended, or what arrived is no B-scan.
     fn poll(&mut self, now: Stamp) -> Result<Option<BScan>, SourceFault>;
 
+    /// Whether a machine that is silent for long has stopped. Not so where only the B-scans that were kept are given
+    /// again: on slow stretches of a path they are far apart in time.
+    fn silence_is_a_fault(&self) -> bool {
+        true
+    }
+
     /// Lets go of the B-scans that have arrived by `now`: nobody wants them. A source that makes its B-scans only when
     /// they are asked for need not make these.
     ///
