@@ -13,7 +13,7 @@ fn tube(rows: usize, around: usize, off: impl Fn(usize, usize) -> f64) -> Mesh {
         let z = 0.1 * row as f64 / (rows - 1) as f64;
         let angle = std::f64::consts::TAU * k as f64 / around as f64;
         let r = 0.004 - 0.002 * (-((z - 0.04) / 0.006_f64).powi(2)).exp() + off(row, k);
-        Point::from_vector(Vector3::new(r * angle.cos() + 0.01 * (z / 0.03).sin(), r * angle.sin(), -z))
+        Point::from_vector(Vector3::new(r * angle.cos() + 0.01 * (z / 0.03).sin(), r * angle.sin(), z))
     };
     let points: Vec<_> =
         (0..rows).flat_map(|row| (0..around).map(move |k| (row, k))).map(|(r, k)| point(r, k)).collect();
