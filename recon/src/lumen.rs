@@ -191,8 +191,8 @@ impl Look<'_> {
     }
 }
 
-/// A border that is less sure than this (mm), and a part of the radius, somewhere is not given. Where a shadow is known to
-/// hide the wall, its standard deviation says so, and the surface weighs it accordingly.
+/// A border that is less sure than this (mm), and a part of the radius, somewhere is not given. Where a shadow or
+/// the picture's edge is known to hide the wall, its standard deviation says so, and the surface weighs it accordingly.
 const MOST_UNSURE_MM: f64 = 0.3;
 const MOST_UNSURE: f64 = 0.1;
 const MOST_UNSURE_SHADED: f64 = 0.25;

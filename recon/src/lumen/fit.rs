@@ -136,7 +136,7 @@ pub(crate) struct Border {
     pub(crate) common_size_sd: f64,
     /// Part of the circumference where a wall is seen (0 to 1).
     pub(crate) walled: f64,
-    /// Whether a shadow hides some of it.
+    /// Whether a shadow, or the picture's edge, hides some of it.
     pub(crate) shaded: bool,
     /// Mean square of how far cells are off the prediction, in standard deviations: about one where a wall round a
     /// lumen is what the picture shows.

@@ -64,7 +64,7 @@ impl Shadows {
             return;
         }
         let covered: Vec<bool> = (0..patch.columns).map(|column| self.cover(patch.place(column).0)).collect();
-        let seen = |column: usize| !covered[column % patch.columns];
+        let seen = |cell: usize| !covered[cell % patch.columns];
         let (mut sum, mut count) = (0.0_f32, 0.0_f32);
         for (_, power) in patch.power.iter().enumerate().filter(|(cell, _)| seen(*cell)) {
             (sum, count) = (sum + power, count + 1.0);
