@@ -70,5 +70,5 @@ pub use section::{NotMeasured, Section, SectionMeasure};
 pub use settings::{LumenSettings, SeedPoint};
 pub use stenosis::{Reference, ReferenceChoice, ReferenceSide, Stenosis};
 pub use surface::LumenSurface;
-pub use uncertainty::ErrorBudget;
+pub use uncertainty::{ErrorBudget, Tracking};
 pub use vessel::{Leaves, Vessel};

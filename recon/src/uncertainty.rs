@@ -11,11 +11,13 @@
 
 mod budget;
 mod station;
+mod tracking;
 
 use crate::Section;
 pub use budget::ErrorBudget;
 use budget::PARAMETERS;
 pub(crate) use station::{Shown, Station, stations};
+pub use tracking::Tracking;
 
 /// How many independent causes a whole scan shares: what a calibration says, and where the wall is taken to be.
 pub(crate) const COMMON: usize = PARAMETERS + 1;

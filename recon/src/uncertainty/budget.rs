@@ -4,10 +4,13 @@ use nalgebra::SMatrix;
 use probepath_us_capture::Calibration;
 use serde::{Deserialize, Serialize};
 
+use super::tracking::Tracking;
 use crate::ReconError;
 
 /// Parameters of a calibration that an area hangs on.
 pub(crate) const PARAMETERS: usize = 10;
+/// Which of them shift the image on the probe.
+const SHIFTS: std::ops::Range<usize> = 3..6;
 
 /// What is known of the errors behind a scan: what its calibration, its poses and its contours are off by.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -27,7 +30,7 @@ pub struct ErrorBudget {
 }
 
 impl Default for ErrorBudget {
-    /// Nothing is known of the calibration: half a millimetre. Poses as of an arm that repeats to 0.1 mm.
+    /// Nothing is known of the calibration: half a millimetre. Nor of what tracked the probe: each pose to 0.1 mm.
     fn default() -> Self {
         Self::unfitted(0.5e-3)
     }
@@ -77,6 +80,17 @@ impl ErrorBudget {
             pose_shared_m: 5e-3,
             border_sd_m: 0.0,
         }
+    }
+
+    /// With the errors of what tracked the probe. What it is off by all along a scan moves every image alike, as an
+    /// error of the image's place on the probe would, and comes on top of it: a calibration made with the same arm
+    /// bears the arm's error where it was made, in another posture.
+    #[must_use]
+    pub fn tracked_by(mut self, tracking: &Tracking) -> Self {
+        for shift in SHIFTS {
+            self.calibration[shift][shift] += 2.0 * tracking.place_sd_m().powi(2);
+        }
+        Self { pose_sd_m: tracking.pose_sd_m(), ..self }
     }
 
     /// Whether every number can be worked with.
@@ -163,6 +177,20 @@ mod tests {
                 assert!((product[(i, k)] - budget.calibration[i][k]).abs() <= 1e-12 * scale.max(1e-12));
             }
         }
+    }
+
+    #[test]
+    fn an_arm_that_is_off_shifts_all_images_and_leaves_turns_and_sizes_alone() {
+        let calibrated = ErrorBudget::default();
+        let tracked =
+            calibrated.clone().tracked_by(&Tracking { accuracy_m: 0.5e-3, repeatability_m: 0.1e-3 });
+        for k in 0..PARAMETERS {
+            let added = tracked.calibration[k][k] - calibrated.calibration[k][k];
+            let expected = if SHIFTS.contains(&k) { 2.0 * (0.5e-3_f64 / 1.5958).powi(2) } else { 0.0 };
+            assert!((added - expected).abs() < 1e-11, "{k}: {added}");
+        }
+        assert!((tracked.pose_sd_m - 0.1e-3 / 3.616).abs() < 1e-8, "{}", tracked.pose_sd_m);
+        assert_eq!(tracked.check(), Ok(()));
     }
 
     #[test]

@@ -13,7 +13,7 @@ use probepath_us_capture::exam::{Attachment, Exam, ExamError};
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::session::lumen_settings;
+use crate::session::{SessionError, cell_of, lumen_settings};
 
 /// A later exam beside an earlier one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -69,6 +69,14 @@ pub enum FollowedUpError {
     /// An exam that cannot be read.
     #[error(transparent)]
     Exam(#[from] ExamError),
+    /// An exam whose cell cannot be read.
+    #[error("{}: {source}", path.display())]
+    Cell {
+        /// The exam.
+        path: PathBuf,
+        /// Why.
+        source: Box<SessionError>,
+    },
     /// An exam without a lumen.
     #[error("{}: {source}", path.display())]
     Lumen {
@@ -119,7 +127,9 @@ fn of_exam(path: &Path) -> Result<Vec<Section>, FollowedUpError> {
     let exam = Exam::open(path)?;
     let calibration = exam.attachment(Attachment::CALIBRATION).and_then(|a| a.text().ok());
     let calibration = calibration.and_then(|text| Calibration::from_toml(text).ok());
-    let found = reconstruct_lumen(&exam.bscans, &lumen_settings(calibration.as_ref()))
+    let cell = cell_of(&exam)
+        .map_err(|source| FollowedUpError::Cell { path: path.into(), source: source.into() })?;
+    let found = reconstruct_lumen(&exam.bscans, &lumen_settings(calibration.as_ref(), cell.as_ref()))
         .map_err(|source| FollowedUpError::Lumen { path: path.into(), source })?;
     Ok(found.sections)
 }

@@ -10,10 +10,11 @@ use probepath_teach_replay::{
     Path, Plan, PlanSettings, Replay, ReplayEnding, ReplayPhase, ReplaySettings, ReplayStatus,
 };
 use probepath_us_capture::exam::Attachment;
-use probepath_us_capture::{Calibration, Capture, Counts, Keeping, PlacedBScan};
+use probepath_us_capture::{Capture, Counts, Keeping, PlacedBScan};
 
 use super::figures::Figures;
 use super::live::Live;
+use super::looking::lumen_settings;
 use super::motion::Motion;
 use super::recorder::{Eye, LATEST, Recorder, Stand};
 use super::resume::Underway;
@@ -23,11 +24,6 @@ use crate::report::build::{ReportError, ScanFigures};
 
 /// Name of the attachment that keeps what a scan has to say, so that a report can be made again from the exam.
 pub(crate) const SCAN_FIGURES: &str = "scan.json";
-
-/// How a lumen is looked for in images that were taken with a calibration.
-pub(crate) fn lumen_settings(calibration: Option<&Calibration>) -> LumenSettings {
-    calibration.map(LumenSettings::of).unwrap_or_default()
-}
 
 /// How a path is to be scanned.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -167,8 +163,13 @@ impl Session {
         if !(wish.look && progress.watches_vessel()) {
             return Ok(None);
         }
-        let settings = lumen_settings(self.cell.calibration.as_ref());
+        let settings = self.lumen_settings();
         Ok(Some(Live::start(settings, Arc::clone(progress))?))
+    }
+
+    /// How a lumen is looked for in this cell's images.
+    fn lumen_settings(&self) -> LumenSettings {
+        lumen_settings(self.cell.calibration.as_ref(), Some(&self.cell.file))
     }
 
     /// What takes B-scans, where there is a machine.
@@ -300,7 +301,7 @@ impl Session {
     pub fn reconstruct(&mut self, scan: &Scan, seed: Option<(f64, f64)>) -> Result<Lumen, SessionError> {
         self.opening.progress.at("reconstructing", 0.0);
         let seed = seed.map(|(x, y)| SeedPoint::Millimetres { x_mm: x * 1e3, y_mm: y * 1e3 });
-        let settings = LumenSettings { seed, ..lumen_settings(self.cell.calibration.as_ref()) };
+        let settings = LumenSettings { seed, ..self.lumen_settings() };
         let recon = reconstruct_lumen(&scan.images, &settings)?;
         self.opening.progress.at("reconstructing", 1.0);
         Ok(Lumen { recon, scan: scan.clone() })

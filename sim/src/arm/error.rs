@@ -43,15 +43,22 @@ pub enum KinematicError {
 }
 
 impl KinematicError {
-    /// Accuracy and repeatability (m) of one arm of this kind.
-    fn figures(self, stream: &mut Stream) -> (f64, f64) {
-        let drawn = stream.uniform(0.50e-3, 0.70e-3);
+    /// Accuracy and repeatability (mm) as a data sheet of this kind of arm has them; one arm's own accuracy is drawn.
+    pub fn sheet_mm(self) -> (f64, f64) {
         match self {
             Self::Off => (0.0, 0.0),
-            Self::UrESeries => (0.10e-3, 0.03e-3),
-            Self::Paper => (drawn, 0.20e-3),
-            Self::Figures { accuracy_mm, repeatability_mm } => (accuracy_mm * 1e-3, repeatability_mm * 1e-3),
+            Self::UrESeries => (0.10, 0.03),
+            Self::Paper => (0.60, 0.20),
+            Self::Figures { accuracy_mm, repeatability_mm } => (accuracy_mm, repeatability_mm),
         }
+    }
+
+    /// Accuracy and repeatability (m) of one arm of this kind.
+    fn figures(self, stream: &mut Stream) -> (f64, f64) {
+        let drawn_mm = stream.uniform(0.50, 0.70);
+        let (accuracy_mm, repeatability_mm) = self.sheet_mm();
+        let accuracy_mm = if self == Self::Paper { drawn_mm } else { accuracy_mm };
+        (accuracy_mm * 1e-3, repeatability_mm * 1e-3)
     }
 }
 

@@ -17,7 +17,7 @@ use super::clip::clipped;
 use super::volume::VOXEL_MM;
 use crate::report::Heading;
 use crate::report::build::{ScanFigures, Segment};
-use crate::session::{SCAN_FIGURES, SEGMENTS, SOFTWARE, lumen_settings};
+use crate::session::{CellFile, SCAN_FIGURES, SEGMENTS, SOFTWARE, cell_of, lumen_settings};
 
 /// A calibration whose rigid part is further off than this (m) is worth a note.
 const SHEAR_M: f64 = 0.0005;
@@ -69,6 +69,7 @@ impl Input {
             return Err(ReconstructError::NoImages { path: input.into() });
         }
         let mut notes = notes_of(&exam);
+        let cell = told_cell(&exam, &mut notes);
         let own = exam.attachment(Attachment::CALIBRATION).and_then(|a| a.text().ok());
         let own = own.and_then(|text| Calibration::from_toml(text).ok());
         let other = calibration.map(read_own).transpose()?;
@@ -87,7 +88,7 @@ impl Input {
             heading: heading(&exam, used, &figures),
             segments: json(&exam, SEGMENTS).unwrap_or_default(),
             figures,
-            lumen: lumen_settings(used),
+            lumen: lumen_settings(used, cell.as_ref()),
             volume: VolumeSettings::every_mm(VOXEL_MM),
         })
     }
@@ -149,7 +150,7 @@ impl Chain {
             return Ok(Self {
                 volume: config.volume.as_ref().map_or_else(usual, VolumeSettings::from),
                 placing: Placing::from_plus(&config)?,
-                lumen: lumen_settings(None),
+                lumen: lumen_settings(None, None),
                 heading: Heading { calibration: file.display().to_string(), ..heading },
             });
         }
@@ -160,7 +161,7 @@ impl Chain {
         Ok(Self {
             placing: Placing { lag: calibration.image_lag, setting, ..Placing::new(map) },
             volume: VolumeSettings::every_mm(VOXEL_MM),
-            lumen: lumen_settings(Some(&calibration)),
+            lumen: lumen_settings(Some(&calibration), None),
             heading: Heading {
                 cell: heading.cell,
                 software: heading.software,
@@ -225,6 +226,16 @@ fn notes_of(exam: &Exam) -> Vec<String> {
         notes.push(format!("the recording does not end as it should ({ending:?}); what is there was used"));
     }
     notes
+}
+
+/// The exam's cell; where its file cannot be read, what it says of arm and machine is not known, and a note says so.
+fn told_cell(exam: &Exam, notes: &mut Vec<String>) -> Option<CellFile> {
+    cell_of(exam).unwrap_or_else(|why| {
+        notes.push(format!(
+            "{why}; how good its arm is and how its machine shows echoes is taken to be the usual"
+        ));
+        None
+    })
 }
 
 fn notes_of_placed(placed: &PlacedSequence) -> Vec<String> {

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use probepath_frames::{Base, Flange, Pose, Probe, World};
+use probepath_recon::Tracking;
 use probepath_robot::drivers::Address;
 use probepath_robot::{Model, ModelError, PANDA_URDF, UR5E_URDF};
 use serde::{Deserialize, Serialize};
@@ -14,6 +15,8 @@ use super::pose::PoseFile;
 const MOST_PAYLOAD_KG: f64 = 30.0;
 /// The centre of gravity of no probe's holder is further from the flange (mm).
 const MOST_LEVER_MM: f64 = 500.0;
+/// An arm that is farther off than this scans nothing (mm).
+const MOST_ERROR_MM: f64 = 5.0;
 /// A guard that waits less would trip over one tick that is late, one that waits longer could not have the arm at rest
 /// within 100 ms (ms).
 const HEARTBEAT_MS: (f64, f64) = (4.0, 80.0);
@@ -40,6 +43,12 @@ pub struct ArmFile {
     /// Its centre of gravity in the flange (mm).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub centre_of_gravity_mm: Option<[f64; 3]>,
+    /// Mean distance between where the probe is and where the model has it, over the workspace (mm).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accuracy_mm: Option<f64>,
+    /// How near it comes to the same place again (mm; the pose repeatability of ISO 9283).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub repeatability_mm: Option<f64>,
     /// The longest time between two states, and the oldest state that is believed (ms).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub heartbeat_ms: Option<f64>,
@@ -96,6 +105,8 @@ impl Default for ArmFile {
             tip_link: None,
             payload_kg: None,
             centre_of_gravity_mm: None,
+            accuracy_mm: None,
+            repeatability_mm: None,
             heartbeat_ms: None,
             time: ControllerTime::Wall,
             world_from_base: None,
@@ -114,6 +125,7 @@ impl ArmFile {
             Address::Ur { .. } => {
                 self.carried()?;
                 self.places()?;
+                self.tracking()?;
                 self.names_a_model()
             }
         }
@@ -127,6 +139,8 @@ impl ArmFile {
             ("arm.tip_link", self.tip_link.is_some()),
             ("arm.payload_kg", self.payload_kg.is_some()),
             ("arm.centre_of_gravity_mm", self.centre_of_gravity_mm.is_some()),
+            ("arm.accuracy_mm", self.accuracy_mm.is_some()),
+            ("arm.repeatability_mm", self.repeatability_mm.is_some()),
             ("arm.time", self.time != ControllerTime::Wall),
             ("arm.world_from_base", self.world_from_base.is_some()),
             ("arm.flange_from_probe", self.flange_from_probe.is_some()),
@@ -156,6 +170,23 @@ impl ArmFile {
             world_from_base: world_from_base.pose("arm.world_from_base")?,
             flange_from_probe: flange_from_probe.pose("arm.flange_from_probe")?,
         })
+    }
+
+    /// How well it knows where the probe is, where its file says it: both figures, or neither.
+    pub(super) fn tracking(&self) -> Result<Option<Tracking>, Wrong> {
+        let (accuracy_mm, repeatability_mm) = match (self.accuracy_mm, self.repeatability_mm) {
+            (None, None) => return Ok(None),
+            (Some(_), None) => {
+                return Err(Wrong::new("arm.accuracy_mm", "is given without repeatability_mm"));
+            }
+            (None, Some(_)) => {
+                return Err(Wrong::new("arm.repeatability_mm", "is given without accuracy_mm"));
+            }
+            (Some(accuracy_mm), Some(repeatability_mm)) => (accuracy_mm, repeatability_mm),
+        };
+        within("arm.accuracy_mm", accuracy_mm, (0.0, MOST_ERROR_MM), "mm")?;
+        within("arm.repeatability_mm", repeatability_mm, (0.0, MOST_ERROR_MM), "mm")?;
+        Ok(Some(Tracking { accuracy_m: accuracy_mm * 1e-3, repeatability_m: repeatability_mm * 1e-3 }))
     }
 
     /// What hangs on the flange, given and possible.

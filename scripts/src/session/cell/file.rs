@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use probepath_recon::Tracking;
 use probepath_robot::drivers::Address;
 use probepath_sim::CellConfig;
 use probepath_us_capture::Calibration;
@@ -118,6 +119,17 @@ impl CellFile {
             MachineAddress::Sim => Some(self.simulated.machine.imaging.dynamic_range_db),
             MachineAddress::Igtl { .. } => self.machine.dynamic_range_db,
             MachineAddress::None => None,
+        }
+    }
+
+    /// How well the arm knows where the probe is, as its data sheet says it.
+    pub(in crate::session) fn tracking(&self) -> Option<Tracking> {
+        match self.arm.address {
+            Address::Simulated => {
+                let (accuracy_mm, repeatability_mm) = self.simulated.arm.kinematic_error.sheet_mm();
+                Some(Tracking { accuracy_m: accuracy_mm * 1e-3, repeatability_m: repeatability_mm * 1e-3 })
+            }
+            Address::Ur { .. } => self.arm.tracking().ok().flatten(),
         }
     }
 

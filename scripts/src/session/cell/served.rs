@@ -19,6 +19,7 @@ impl CellFile {
         let (nominal, config) = (cell.nominal(), cell.config());
         let host = host.to_string();
         let tool = config.arm.tool;
+        let (accuracy_mm, repeatability_mm) = config.arm.kinematic_error.sheet_mm();
         let model = match config.arm.kind {
             ArmKind::Ur5e => "ur5e",
             ArmKind::SevenJoint => "seven_joint",
@@ -28,6 +29,8 @@ impl CellFile {
             model: Some(model.into()),
             payload_kg: Some(tool.mass_kg),
             centre_of_gravity_mm: Some(tool.centre_of_gravity_mm),
+            accuracy_mm: Some(accuracy_mm),
+            repeatability_mm: Some(repeatability_mm),
             // A shared computer is late now and then, the simulated controller as well as we.
             heartbeat_ms: Some(SERVED_HEARTBEAT_MS),
             time,

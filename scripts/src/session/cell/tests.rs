@@ -154,6 +154,21 @@ fn every_wrong_field_is_refused_with_its_line_and_its_name() {
         ("payload_kg = 0.9", "payload_kg = \"0.9 kg\"", "line 7"),
         ("[5.0, 0.0, 70.0]", "[5.0, 0.0, 7000.0]", "line 8: arm.centre_of_gravity_mm is 7000"),
         ("[5.0, 0.0, 70.0]", "[5.0, 70.0]", "line 8"),
+        (
+            "heartbeat_ms = 12.0",
+            "accuracy_mm = 0.1",
+            "line 9: arm.accuracy_mm is given without repeatability_mm",
+        ),
+        (
+            "heartbeat_ms = 12.0",
+            "repeatability_mm = 0.1",
+            "arm.repeatability_mm is given without accuracy_mm",
+        ),
+        (
+            "heartbeat_ms = 12.0",
+            "accuracy_mm = 0.1\nrepeatability_mm = nan",
+            "line 10: arm.repeatability_mm is NaN",
+        ),
         ("heartbeat_ms = 12.0", "heartbeat_ms = 0.5", "line 9: arm.heartbeat_ms is 0.5"),
         ("written_in = \"World\"", "written_in = \"Flange\"", "line 11: arm.world_from_base is no pose"),
         ("rotation_deg = [90.0, 0.0, 0.0]", "rotation_rad = [1.57, 0.0, 0.0]", "rotation_rad"),
