@@ -14,6 +14,9 @@ mod shadow;
 mod track;
 mod wall;
 
+use std::collections::BTreeSet;
+
+use nalgebra::Vector3;
 use probepath_frames::{Point, World};
 use probepath_us_capture::PlacedBScan;
 use rayon::prelude::*;
@@ -53,21 +56,11 @@ pub fn segment(images: &[PlacedBScan], settings: &LumenSettings) -> Vec<ImageLum
     let mut regions = track::follow(images, &table, settings);
     let mut borders = first_borders(images, &regions, &look);
     again::second_look(images, &look, &mut regions, &mut borders);
-    for pass in 0..PASSES {
-        // Before the beam's thickness is thought of, walls that run aslant look thick.
-        let wall =
-            if pass > 0 { wall_of(images, &borders).prior(settings.wall_thickness_m) } else { look.wall };
-        let look = Look { wall, last: pass + 1 == PASSES, ..look };
-        let planes = beam::planes(images, &borders, &settings.point_spread);
-        let inputs = images.par_iter().zip(&regions).zip(&planes);
-        borders = inputs
-            .zip(borders.par_iter())
-            .map(|(((image, region), planes), border)| {
-                let (Ok(region), Ok(earlier)) = (region, border) else { return border.clone() };
-                look.fitted(image, region, planes, Start::Again(earlier))
-            })
-            .collect();
-    }
+    let telling = telling(images, &borders);
+    fit_again((images, &regions), &mut borders, &look, |_| true, |index| telling.contains(&index));
+    let wall = wall_of(images, &borders, &telling).prior(settings.wall_thickness_m);
+    let last = Look { wall, last: true, ..look };
+    fit_again((images, &regions), &mut borders, &last, |index| telling.contains(&index), |_| true);
     let each = images.iter().zip(regions.iter().zip(borders));
     let lumens = each.map(|(image, (region, border))| {
         let lumen = match (region, border) {
@@ -82,13 +75,47 @@ pub fn segment(images: &[PlacedBScan], settings: &LumenSettings) -> Vec<ImageLum
     lumens
 }
 
-/// What all images say of the wall.
-fn wall_of(images: &[PlacedBScan], borders: &[Result<Border, NoLumen>]) -> Walls {
+/// Fits the wall once more in the images that are `wanted`, with what the beam's thickness takes in, as the images that are
+/// `asked` say it.
+fn fit_again(
+    (images, regions): (&[PlacedBScan], &[Result<Region, NoLumen>]),
+    borders: &mut [Result<Border, NoLumen>],
+    look: &Look<'_>,
+    asked: impl Fn(usize) -> bool,
+    wanted: impl Fn(usize) -> bool + Sync,
+) {
+    let planes = beam::planes(images, borders, &look.settings.point_spread, asked);
+    let inputs = images.par_iter().zip(regions).zip(&planes).enumerate();
+    inputs.zip(borders).for_each(|((index, ((image, region), planes)), border)| {
+        if let (true, Ok(region), Ok(earlier)) = (wanted(index), region, &*border) {
+            *border = look.fitted(image, region, planes, Start::Again(earlier));
+        }
+    });
+}
+
+/// The images that are asked how thick the wall is: nearer ones see the same speckle.
+fn telling(images: &[PlacedBScan], borders: &[Result<Border, NoLumen>]) -> BTreeSet<usize> {
+    let mut last: Option<Vector3<f64>> = None;
+    let far = |(index, (image, border)): (usize, (&PlacedBScan, &Result<Border, NoLumen>))| {
+        let centre = centre(image, border.as_ref().ok()?);
+        let apart = last.is_none_or(|last| (last - centre).norm() >= TELLING_M);
+        apart.then(|| last = Some(centre)).map(|()| index)
+    };
+    images.iter().zip(borders).enumerate().filter_map(far).collect()
+}
+
+/// Where a border is in the World (m).
+fn centre(image: &PlacedBScan, border: &Border) -> Vector3<f64> {
+    (image.world_from_image * Point::new(border.centre.0, border.centre.1, 0.0)).vector()
+}
+
+/// What these images say of the wall.
+fn wall_of(images: &[PlacedBScan], borders: &[Result<Border, NoLumen>], telling: &BTreeSet<usize>) -> Walls {
     let mut walls = Walls::default();
-    for (image, border) in images.iter().zip(borders) {
+    for (image, border) in telling.iter().filter_map(|&index| Some((images.get(index)?, borders.get(index)?)))
+    {
         if let Ok(border) = border {
-            let centre = image.world_from_image * Point::new(border.centre.0, border.centre.1, 0.0);
-            walls.add(border, centre.vector());
+            walls.add(border, centre(image, border));
         }
     }
     walls
@@ -128,8 +155,8 @@ fn first_borders(
     images.par_chunks(RUN).zip(regions.par_chunks(RUN)).flat_map_iter(run).collect()
 }
 
-/// How often the wall is fitted again with what the neighbouring images say about the beam's thickness.
-const PASSES: usize = 2;
+/// Images nearer to each other than this (m) say hardly more of the wall than one of them.
+const TELLING_M: f64 = 1.2e-3;
 
 /// What every fit needs.
 #[derive(Clone, Copy)]

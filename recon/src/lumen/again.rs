@@ -10,8 +10,8 @@ use probepath_us_capture::PlacedBScan;
 
 use super::fit::Border;
 use super::region::{RAYS, Region, angle};
+use super::shadow::Shadows;
 use super::{Look, NoLumen, astray, track};
-use crate::PointSpread;
 use crate::settings::FWHM;
 
 /// Lumens farther apart than this say little about what lies between (m).
@@ -71,7 +71,7 @@ fn fill_between(
     regions: &mut [Result<Region, NoLumen>],
     borders: &mut Borders,
 ) {
-    let expected = between(images, borders, &look.settings.point_spread);
+    let expected = between(images, borders, look);
     for (((image, border), region), disc) in images.iter().zip(borders).zip(regions).zip(expected) {
         let Some(disc) = disc.filter(|_| open(region, border)) else { continue };
         if let Some(fitted) = look.walled(image, &disc) {
@@ -124,7 +124,7 @@ fn carried(
         return walled(image, look, region);
     }
     let grown = track::grown(image, look.table, look.settings, place).ok();
-    let disc = self::disc(image, &look.settings.point_spread, place, radius);
+    let disc = self::disc(image, look, place, radius);
     grown.into_iter().chain([disc]).find_map(|region| {
         let (region, border) = walled(image, look, region)?;
         let (_, centre) = super::area_and_centre(&border.contour());
@@ -152,7 +152,7 @@ fn centred(
     if (x - region.centre.0).hypot(y - region.centre.1) < OFF_CENTRE * radius {
         return None;
     }
-    let disc = disc(image, &look.settings.point_spread, (x, y), radius);
+    let disc = disc(image, look, (x, y), radius);
     let border = look.walled(image, &disc)?;
     Some((disc, border))
 }
@@ -169,14 +169,14 @@ pub(super) fn seen(image: &PlacedBScan, border: &Border) -> (Vector3<f64>, f64) 
 fn between(
     images: &[PlacedBScan],
     borders: &[Result<Border, NoLumen>],
-    spread: &PointSpread,
+    look: &Look<'_>,
 ) -> Vec<Option<Region>> {
     let seen: Vec<Option<(Vector3<f64>, f64)>> =
         images.iter().zip(borders).map(|(image, border)| Some(seen(image, border.as_ref().ok()?))).collect();
     let expected = |(index, image): (usize, &PlacedBScan)| {
         let (before, after) = seen.split_at(index);
         let (a, ra) = (*before.iter().rev().flatten().next()?, *after.iter().skip(1).flatten().next()?);
-        expected(image, spread, a, ra)
+        expected(image, look, a, ra)
     };
     images.iter().enumerate().map(expected).collect()
 }
@@ -184,7 +184,7 @@ fn between(
 /// The disc that lies in the image's plane between two lumens (centre and radius).
 fn expected(
     image: &PlacedBScan,
-    spread: &PointSpread,
+    look: &Look<'_>,
     before: (Vector3<f64>, f64),
     after: (Vector3<f64>, f64),
 ) -> Option<Region> {
@@ -196,18 +196,20 @@ fn expected(
         return None;
     }
     let (centre, radius) = (a.lerp(&b, t), before.1 + (after.1 - before.1) * t);
-    Some(disc(image, spread, (centre.x, centre.y), radius))
+    Some(disc(image, look, (centre.x, centre.y), radius))
 }
 
 /// A disc as a front would have filled it.
-fn disc(image: &PlacedBScan, spread: &PointSpread, centre: (f64, f64), radius: f64) -> Region {
-    let setting = &image.bscan.setting;
+fn disc(image: &PlacedBScan, look: &Look<'_>, centre: (f64, f64), radius: f64) -> Region {
+    let (setting, spread) = (&image.bscan.setting, &look.settings.point_spread);
     let depth = setting.window_top_m + centre.1;
-    let sigma = (spread.lateral_m(depth, setting) / FWHM, spread.axial_fwhm_m / FWHM);
+    let lateral = spread.lateral_m(depth, setting);
+    let sigma = (lateral / FWHM, spread.axial_fwhm_m / FWHM);
     // As far inside as a front would have stopped.
     let inside = |ray| {
         let (sin, cos) = angle(ray).sin_cos();
         (radius - 1.75 * (sigma.0 * cos).hypot(sigma.1 * sin)).max(0.1e-3)
     };
-    Region { centre, radii: (0..RAYS).map(inside).collect(), excess: 1.0 }
+    let shadows = Shadows::below(&image.bscan, look.table, centre.1, lateral);
+    Region { centre, radii: (0..RAYS).map(inside).collect(), excess: 1.0, shadows }
 }

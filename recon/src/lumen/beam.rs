@@ -38,28 +38,31 @@ impl Section {
     }
 }
 
-/// The planes of every image's beam.
+/// The planes of every image's beam, as the images that are `asked` say together how the vessel runs.
 pub(crate) fn planes(
     images: &[PlacedBScan],
     borders: &[Result<Border, NoLumen>],
     spread: &PointSpread,
+    asked: impl Fn(usize) -> bool,
 ) -> Vec<Vec<Plane>> {
     let section = |(image, border): (&PlacedBScan, &Result<Border, NoLumen>)| {
         border.as_ref().ok().map(|border| Section::of(image, border))
     };
-    let sections: Vec<Option<Section>> = images.par_iter().zip(borders).map(section).collect();
-    (0..images.len()).into_par_iter().map(|index| of_index(index, images, &sections, spread)).collect()
+    let own: Vec<Option<Section>> = images.par_iter().zip(borders).map(section).collect();
+    let told = own.iter().enumerate().map(|(index, section)| section.filter(|_| asked(index)));
+    let told: Vec<Option<Section>> = told.collect();
+    let each = images.par_iter().zip(&own).enumerate();
+    each.map(|(index, (image, own))| of_index(index, image, own.as_ref(), &told, spread)).collect()
 }
 
 fn of_index(
     index: usize,
-    images: &[PlacedBScan],
+    image: &PlacedBScan,
+    own: Option<&Section>,
     sections: &[Option<Section>],
     spread: &PointSpread,
 ) -> Vec<Plane> {
-    let Some((image, Some(own))) = images.get(index).zip(sections.get(index)) else {
-        return Plane::ITSELF.to_vec();
-    };
+    let Some(own) = own else { return Plane::ITSELF.to_vec() };
     // A sweep goes on: beyond the first section that is far away, none is near.
     let image_from_world = image.world_from_image.inverse();
     let near = |section: &&Section| {

@@ -10,6 +10,7 @@ use probepath_frames::{Image, Pose, World};
 use probepath_us_capture::PlacedBScan;
 
 use super::finder::Followed;
+use super::seed::Corners;
 use super::{Contour, ImageLumen, Look, seed, track};
 
 /// How far back a branch may have been inside the lumen (m).
@@ -26,8 +27,8 @@ const SAME_M: f64 = 1.5e-3;
 struct Outline {
     image_from_world: Pose<Image, World>,
     points: Vec<(f64, f64)>,
-    /// The box round the points: its corners.
-    corners: [(f64, f64); 2],
+    /// The box round the points.
+    corners: Corners,
     area_mm2: f64,
 }
 
@@ -37,10 +38,8 @@ impl Outline {
         let points: Vec<(f64, f64)> =
             contour.pixels.iter().map(|p| (p.0 * spacing.x_m, p.1 * spacing.y_m)).collect();
         let image_from_world = image.world_from_image.inverse();
-        let low = points.iter().fold((f64::INFINITY, f64::INFINITY), |a, p| (a.0.min(p.0), a.1.min(p.1)));
-        let high =
-            points.iter().fold((f64::NEG_INFINITY, f64::NEG_INFINITY), |a, p| (a.0.max(p.0), a.1.max(p.1)));
-        Self { image_from_world, points, corners: [low, high], area_mm2: contour.area_mm2 }
+        let corners = points.iter().map(|p| [*p, *p]).reduce(around).unwrap_or_default();
+        Self { image_from_world, points, corners, area_mm2: contour.area_mm2 }
     }
 
     /// This outline beside another image.
@@ -67,6 +66,23 @@ impl Beside<'_> {
         let here = (self.own_from_image * probepath_frames::Point::new(place.0, place.1, 0.0)).vector();
         self.outline.holds((here.x, here.y))
     }
+
+    /// The box round it in the other image.
+    fn corners(&self) -> Corners {
+        let [low, high] = self.outline.corners;
+        let image_from_own = self.own_from_image.inverse();
+        let place = |(x, y): (f64, f64)| {
+            let place = (image_from_own * probepath_frames::Point::new(x, y, 0.0)).vector();
+            [(place.x, place.y); 2]
+        };
+        [(low.0, high.1), (high.0, low.1), high].map(place).into_iter().fold(place(low), around)
+    }
+}
+
+/// The box round two boxes.
+fn around(a: Corners, b: Corners) -> Corners {
+    let [(low_a, high_a), (low_b, high_b)] = [(a[0], a[1]), (b[0], b[1])];
+    [(low_a.0.min(low_b.0), low_a.1.min(low_b.1)), (high_a.0.max(high_b.0), high_a.1.max(high_b.1))]
 }
 
 /// Whether a place is inside a closed line (it is crossed an odd number of times on the way out).
@@ -129,13 +145,11 @@ impl Branches {
         let opened = |outline: &&Outline| outline.area_mm2 > LARGER * main.area_mm2;
         let wide: Vec<Beside<'_>> =
             self.outlines.iter().filter(opened).map(|outline| outline.beside(image)).collect();
-        if wide.is_empty() {
-            return None;
-        }
+        let within = wide.iter().map(Beside::corners).reduce(around)?;
         let own = Outline::of(image, main);
         let allowed =
             |place: (f64, f64)| !own.holds(place) && wide.iter().any(|outline| outline.holds(place));
-        let place = seed::find(&image.bscan, look.table, look.settings, allowed).ok()?;
+        let place = seed::find(&image.bscan, look.table, look.settings, within, allowed).ok()?;
         let mut vessel = Followed::default();
         let contour = grown(image, look, &mut vessel, place)?;
         if !known.iter().chain([main]).all(|other| apart(&contour, other)) {

@@ -7,6 +7,7 @@
 use std::cell::Cell;
 
 use super::NoLumen;
+use super::shadow::Shadows;
 use crate::fast_marching::{MarchGrid, march};
 use crate::patch::{Patch, decibel};
 
@@ -29,6 +30,15 @@ pub(crate) struct Region {
     pub(crate) radii: Vec<f64>,
     /// Its area over the area inside `radii`: well above 1 where it runs on into a branch.
     pub(crate) excess: f64,
+    /// What hides the wall there.
+    pub(crate) shadows: Shadows,
+}
+
+/// What the front filled, as [`Region`] has it.
+struct Filled {
+    centre: (f64, f64),
+    radii: Vec<f64>,
+    excess: f64,
 }
 
 /// Decibels of lumen and tissue, as normal distributions.
@@ -41,8 +51,20 @@ struct Statistics {
 /// holes are as deep after it in every picture.
 const SMOOTH: (f64, f64) = (0.18, 0.57);
 
-/// Grows the region round `seed` (m, in the image), where a point is this wide (full widths along x and y, m).
-pub(crate) fn grow(patch: &Patch, seed: (f64, f64), widths: (f64, f64)) -> Result<Region, NoLumen> {
+/// Grows the region round `seed` (m, in the image), where a point is this wide (full widths along x and y, m); no front
+/// runs through what `shadows` cover.
+pub(crate) fn grow(
+    mut patch: Patch,
+    shadows: Shadows,
+    seed: (f64, f64),
+    widths: (f64, f64),
+) -> Result<Region, NoLumen> {
+    shadows.fill(&mut patch);
+    let filled = grown_in(&patch, seed, widths)?;
+    Ok(Region { centre: filled.centre, radii: filled.radii, excess: filled.excess, shadows })
+}
+
+fn grown_in(patch: &Patch, seed: (f64, f64), widths: (f64, f64)) -> Result<Filled, NoLumen> {
     let outside = NoLumen::OutsidePicture { x_mm: seed.0 * 1e3, y_mm: seed.1 * 1e3 };
     let smooth = patch.smoothed((SMOOTH.0 * widths.0, SMOOTH.1 * widths.1));
     let db: Vec<f32> = smooth.iter().map(|power| decibel(*power)).collect();
@@ -64,7 +86,7 @@ pub(crate) fn grow(patch: &Patch, seed: (f64, f64), widths: (f64, f64)) -> Resul
     found
 }
 
-fn grow_with(patch: &Patch, db: &[f32], start: usize, mut statistics: Statistics) -> Result<Region, NoLumen> {
+fn grow_with(patch: &Patch, db: &[f32], start: usize, mut statistics: Statistics) -> Result<Filled, NoLumen> {
     statistics.sharpen();
     let first = fill(patch, db, start, &statistics);
     // Learned again from what was filled, unless that has run out of the lumen.
@@ -165,7 +187,7 @@ fn fill(patch: &Patch, db: &[f32], start: usize, statistics: &Statistics) -> Vec
 }
 
 /// Centre and border of the filled cells.
-fn describe(patch: &Patch, cells: &[usize]) -> Result<Region, NoLumen> {
+fn describe(patch: &Patch, cells: &[usize]) -> Result<Filled, NoLumen> {
     let area = cells.len() as f64 * patch.cell.0 * patch.cell.1;
     let mut filled = vec![false; patch.power.len()];
     cells.iter().for_each(|&cell| filled[cell] = true);
@@ -191,7 +213,7 @@ fn describe(patch: &Patch, cells: &[usize]) -> Result<Region, NoLumen> {
     let far = 1.6 * median;
     let radii: Vec<f64> = (0..RAYS).map(|ray| median_round(&raw, ray).min(far)).collect();
     let inside: f64 = radii.iter().map(|r| r * r).sum::<f64>() * std::f64::consts::PI / RAYS as f64;
-    Ok(Region { centre, radii, excess: area / inside.max(1e-12) })
+    Ok(Filled { centre, radii, excess: area / inside.max(1e-12) })
 }
 
 fn on_edge(patch: &Patch, cell: usize) -> bool {

@@ -21,6 +21,7 @@ const BESIDE: f64 = 0.6;
 const STEP: (usize, usize) = (2, 3);
 
 /// Which columns of a picture are in a shadow at some depth.
+#[derive(Clone, Debug)]
 pub(crate) struct Shadows {
     step_m: f64,
     dark: Vec<bool>,

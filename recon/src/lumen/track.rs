@@ -60,7 +60,10 @@ pub(crate) fn region(
         let allowed = |at: (f64, f64)| {
             near.is_none_or(|(place, reach)| (at.0 - place.0).hypot(at.1 - place.1) <= reach)
         };
-        seed::find(&image.bscan, table, settings, allowed)
+        let within = near.map_or(seed::everywhere(&image.bscan), |((x, y), reach)| {
+            [(x - reach, y - reach), (x + reach, y + reach)]
+        });
+        seed::find(&image.bscan, table, settings, within, allowed)
     };
     let Some(place) = predicted(image, trail) else {
         return grown(image, table, settings, look(None)?);
@@ -86,12 +89,11 @@ pub(crate) fn grown(
 ) -> Result<Region, NoLumen> {
     let half = WINDOW * settings.radius_range_m.1;
     let outside = NoLumen::OutsidePicture { x_mm: place.0 * 1e3, y_mm: place.1 * 1e3 };
-    let mut patch =
-        Patch::around(&image.bscan, table, place, (half, half), (CELL_M, CELL_M)).ok_or(outside)?;
+    let patch = Patch::around(&image.bscan, table, place, (half, half), (CELL_M, CELL_M)).ok_or(outside)?;
     let spread = &settings.point_spread;
     let lateral = spread.lateral_m(image.bscan.setting.window_top_m + place.1, &image.bscan.setting);
-    Shadows::below(&image.bscan, table, place.1, lateral).fill(&mut patch);
-    let region = grow(&patch, place, (lateral, spread.axial_fwhm_m))?;
+    let shadows = Shadows::below(&image.bscan, table, place.1, lateral);
+    let region = grow(patch, shadows, place, (lateral, spread.axial_fwhm_m))?;
     let by = (region.centre.0 - place.0).hypot(region.centre.1 - place.1);
     if by > 0.6 * settings.radius_range_m.1 { Err(NoLumen::Jump { by_mm: by * 1e3 }) } else { Ok(region) }
 }
