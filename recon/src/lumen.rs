@@ -209,20 +209,30 @@ impl Look<'_> {
         if border.misfit > MOST_MISFIT {
             return Err(NoLumen::Misfit { times: border.misfit });
         }
-        let sd_mm = contour.points_sd_mm.iter().copied().fold(0.0, f64::max);
-        let part = if border.shaded { MOST_UNSURE_SHADED } else { MOST_UNSURE };
-        if sd_mm > MOST_UNSURE_MM + part * radius {
-            return Err(NoLumen::Unsure { sd_mm });
+        let unsure = |(at, sd_mm): (&(f64, f64), &f64)| {
+            let part = if hidden(image, region, *at) { MOST_UNSURE_HIDDEN } else { MOST_UNSURE };
+            (*sd_mm > MOST_UNSURE_MM + part * radius).then_some(*sd_mm)
+        };
+        let unsure = contour.pixels.iter().zip(&contour.points_sd_mm).filter_map(unsure);
+        match unsure.reduce(f64::max) {
+            Some(sd_mm) => Err(NoLumen::Unsure { sd_mm }),
+            None => Ok(contour),
         }
-        Ok(contour)
     }
 }
 
+/// Whether a shadow or the picture's edge hides what is at a pixel.
+fn hidden(image: &PlacedBScan, region: &Region, (column, row): (f64, f64)) -> bool {
+    let (width, height) = (image.bscan.width() as f64, image.bscan.height() as f64);
+    let seen = (0.0..width).contains(&column) && (0.0..height).contains(&row);
+    !seen || region.shadows.cover(column * image.bscan.setting.spacing.x_m)
+}
+
 /// A border that is less sure than this (mm), and a part of the radius, somewhere is not given. Where a shadow or
-/// the picture's edge is known to hide the wall, its standard deviation says so, and the surface weighs it accordingly.
+/// the picture's edge hides the wall, its standard deviation says so, and the surface weighs it accordingly.
 const MOST_UNSURE_MM: f64 = 0.3;
 const MOST_UNSURE: f64 = 0.1;
-const MOST_UNSURE_SHADED: f64 = 0.25;
+const MOST_UNSURE_HIDDEN: f64 = 0.25;
 /// What a wall round a lumen cannot be by speckle: 0.7 to 0.95 are usual, wrong borders are above 1.2.
 const MOST_MISFIT: f64 = 1.15;
 

@@ -21,7 +21,8 @@ pub struct Stenosis {
     /// Standard deviation of `percent_area`, from everything known (points).
     pub percent_area_sd: f64,
     /// Holds the true percent area with 95 % probability. What the whole scan shares (scale, wall, calibration)
-    /// moves the narrowest place and the reference together, and is not counted twice.
+    /// moves the narrowest place and the reference together, and is not counted twice. Where it may be narrower unseen, it
+    /// reaches to 100.
     pub percent_area_interval: [f64; 2],
     /// The same for the percent diameter.
     pub percent_diameter_interval: [f64; 2],
@@ -37,6 +38,13 @@ pub struct Stenosis {
     pub length_interval_mm: [f64; 2],
     /// Whether it runs on beyond what was measured: then it may be narrower there, and longer.
     pub cut_off: bool,
+    /// How much of it, or of the hole that it ends at, no image shows (mm).
+    #[serde(default)]
+    pub unseen_mm: f64,
+    /// Whether it may be narrower than what was measured, because its narrowest place may not have been seen: the percents
+    /// are the least that it has lost.
+    #[serde(default)]
+    pub may_be_narrower: bool,
     /// The least area (mm2).
     pub min_area_mm2: f64,
     /// Its 95 % interval (mm2).

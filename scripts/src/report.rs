@@ -148,6 +148,12 @@ pub struct StenosisRow {
     pub length_interval_mm: [f64; 2],
     /// Whether it runs on beyond what was measured.
     pub cut_off: bool,
+    /// How much of it no image shows (mm).
+    #[serde(default)]
+    pub unseen_mm: f64,
+    /// Whether its narrowest place may not have been seen: then the percents are the least that it has lost.
+    #[serde(default)]
+    pub may_be_narrower: bool,
     /// Smallest lumen area (mm2).
     pub min_area_mm2: f64,
     /// Its 95 % interval (mm2).
@@ -166,6 +172,19 @@ pub struct StenosisRow {
     pub reference_area_mm2: f64,
     /// What the reference is.
     pub reference: String,
+}
+
+impl StenosisRow {
+    /// Why its narrowest place may not have been seen, if so.
+    pub(crate) fn may_be_narrower_because(&self) -> Option<String> {
+        self.may_be_narrower.then(|| {
+            if self.unseen_mm > 0.0 {
+                format!("{:.1} mm of it no image shows", self.unseen_mm)
+            } else {
+                "it is narrowest where the scan ends".to_owned()
+            }
+        })
+    }
 }
 
 /// One named segment of the artery.

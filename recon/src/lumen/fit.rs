@@ -138,8 +138,6 @@ pub(crate) struct Border {
     pub(crate) common_size_sd: f64,
     /// Part of the circumference where a wall is seen (0 to 1).
     pub(crate) walled: f64,
-    /// Whether a shadow, or the picture's edge, hides some of it.
-    pub(crate) shaded: bool,
     /// Mean square of how far cells are off the prediction, in standard deviations: about one where a wall round a
     /// lumen is what the picture shows.
     pub(crate) misfit: f64,
@@ -324,7 +322,6 @@ impl<'a> Model<'a> {
             common_sd: mean_square(|k| common[(k, k)]).sqrt().hypot(spread),
             common_size_sd: common[(0, 0)].sqrt().hypot(spread_size),
             walled: self.sight.walled,
-            shaded: self.sight.shaded,
             misfit,
             wall: self.unknowns[THICKNESS].exp(),
             told: Told::apart_from(&self.input.wall, self.unknowns[THICKNESS], variance),

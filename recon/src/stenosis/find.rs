@@ -12,6 +12,10 @@ use crate::{LumenSettings, Section};
 const RECOVERY: f64 = 0.4;
 /// A narrowing of less than this (%), or of half of what is called a stenosis, is noise: normal segments may hold it.
 const HARDLY: f64 = 15.0;
+/// Places farther apart than this have something unseen between them (mm): sections are half a millimetre apart.
+const UNSEEN_MM: f64 = 1.2;
+/// A narrowing whose narrowest place is this near to where the scan ends may be narrower beyond (mm).
+const AT_THE_END_MM: f64 = 2.0;
 
 /// A narrowing, before it is measured.
 struct Narrowing {
@@ -88,6 +92,22 @@ impl Narrowing {
         from < at && at < to
     }
 
+    /// How much of it no image shows, and of the hole beyond an end that was not reached (mm).
+    fn unseen_mm(&self, places: &[Place]) -> f64 {
+        let [from, to] = self.ends.each_ref().map(|end| end.index);
+        let first = if self.ends[0].reached { from } else { from.saturating_sub(1) };
+        let last = if self.ends[1].reached { to } else { (to + 1).min(places.len() - 1) };
+        let gaps = places[first..=last].windows(2).map(|two| two[1].at - two[0].at);
+        gaps.filter(|gap| *gap > UNSEEN_MM).sum()
+    }
+
+    /// Whether it is narrowest where what was measured ends.
+    fn narrows_out_of_sight(&self, places: &[Place]) -> bool {
+        let narrowest = places[self.narrowest].at;
+        let ends = [places.first(), places.last()].into_iter().flatten();
+        ends.zip(&self.ends).any(|(place, end)| !end.reached && (place.at - narrowest).abs() < AT_THE_END_MM)
+    }
+
     /// How much of the larger shoulder's area is missing (%).
     fn depth(&self, places: &[Place]) -> f64 {
         let shoulder = self.ends.iter().map(|end| places[end.index].smooth).fold(0.0, f64::max);
@@ -130,6 +150,11 @@ fn stenosis(
     let place_sd = place_sd(places, narrowing).hypot(along);
     let length_sd = length_sd(places, narrowing);
     let length = to_mm - from_mm;
+    let unseen_mm = narrowing.unseen_mm(places);
+    let may_be_narrower = unseen_mm > 0.0 || narrowing.narrows_out_of_sight(places);
+    // Nobody knows how narrow it is where nobody looked.
+    let (parts, area_mm2) =
+        if may_be_narrower { ([parts[0], 0.0], [0.0, area_mm2[1]]) } else { (parts, area_mm2) };
     Stenosis {
         percent_area: 100.0 * (1.0 - ratio),
         percent_diameter: 100.0 * (1.0 - ratio.sqrt()),
@@ -142,6 +167,8 @@ fn stenosis(
         length_mm: length,
         length_interval_mm: around(length, length_sd).map(|mm| mm.max(0.0)),
         cut_off: !narrowing.ends.iter().all(|end| end.reached),
+        unseen_mm,
+        may_be_narrower,
         min_area_mm2: least.area,
         min_area_interval_mm2: area_mm2,
         min_diameter_mm: diameter_of(least.area),

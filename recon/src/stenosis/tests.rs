@@ -165,6 +165,36 @@ fn a_stenosis_that_runs_out_of_the_scan_is_said_to() {
 }
 
 #[test]
+fn a_stenosis_whose_narrowest_place_no_image_shows_may_be_narrower() {
+    let whole = vessel(80.0, &[(40.0, 20.0, 0.8)]);
+    let [seen] = find(&whole, 35.0)[..] else { panic!("one stenosis") };
+    assert!(!seen.may_be_narrower && seen.unseen_mm.abs() < 1e-9, "{seen:?}");
+    for (from, to) in [(38.6, 41.4), (36.6, 43.4)] {
+        let mut sections = whole.clone();
+        for hidden in sections.iter_mut().filter(|section| (from..to).contains(&section.at_mm)) {
+            (hidden.measure, hidden.missing) = (None, Some(NotMeasured::NotSeen));
+        }
+        let found = find(&sections, 35.0);
+        assert!(!found.is_empty(), "{from} to {to}");
+        for found in found {
+            let [low, high] = found.percent_area_interval;
+            assert!(found.may_be_narrower && (found.unseen_mm - (to - from)).abs() < 1.0, "{found:?}");
+            assert!(found.percent_area < 80.0 && low < found.percent_area && high > 99.9, "{found:?}");
+            assert!(found.percent_diameter_interval[1] > 99.9 && found.min_area_interval_mm2[0] < 0.1);
+        }
+    }
+}
+
+#[test]
+fn a_stenosis_that_is_narrowest_where_the_scan_ends_may_be_narrower_beyond() {
+    let [out] = find(&vessel(60.0, &[(62.0, 20.0, 0.7)]), 35.0)[..] else { panic!("one stenosis") };
+    assert!(out.cut_off && out.may_be_narrower && out.percent_area_interval[1] > 99.9, "{out:?}");
+    // Its bottom was seen, and only its end was not.
+    let [end] = find(&vessel(60.0, &[(54.0, 20.0, 0.7)]), 35.0)[..] else { panic!("one stenosis") };
+    assert!(end.cut_off && !end.may_be_narrower, "{end:?}");
+}
+
+#[test]
 fn a_lumen_that_lies_against_the_wall_is_asymmetric_by_as_much() {
     let mut sections = vessel(80.0, &[(40.0, 20.0, 0.75)]);
     let off = |sections: &[Section]| {

@@ -190,6 +190,8 @@ fn stenosis_row(index: usize, found: &Stenosis, from: &Ingredients<'_>) -> Steno
         length_mm: found.length_mm,
         length_interval_mm: found.length_interval_mm,
         cut_off: found.cut_off,
+        unseen_mm: found.unseen_mm,
+        may_be_narrower: found.may_be_narrower,
         min_area_mm2: found.min_area_mm2,
         min_area_interval_mm2: found.min_area_interval_mm2,
         min_diameter_mm: found.min_diameter_mm,

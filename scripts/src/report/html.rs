@@ -81,7 +81,8 @@ fn heading(body: &mut String, report: &Report) {
             )
         },
     );
-    let _ = write!(body, "<p class='verdict'>{verdict}</p>");
+    let caution = worst.and_then(|s| Some(format!(" It may be narrower: {}.", s.may_be_narrower_because()?)));
+    let _ = write!(body, "<p class='verdict'>{verdict}{}</p>", caution.unwrap_or_default());
 }
 
 /// A number and its noun.
@@ -156,7 +157,7 @@ fn stenosis(body: &mut String, s: &StenosisRow) {
     let asymmetry = s.asymmetry.map_or_else(|| "not known".to_owned(), |part| format!("{part:.2}"));
     let cells = [
         or_not_named(&escape(&s.segment)).to_owned(),
-        format!("<b>{:.1} %</b>{}", s.percent_area, span(s.percent_area_interval)),
+        format!("<b>{:.1} %</b>{}{}", s.percent_area, span(s.percent_area_interval), caution(s)),
         format!("<b>{:.1} %</b>{}", s.percent_diameter, span(s.percent_diameter_interval)),
         escape(&s.grade),
         format!("{:.1} mm{}", s.at_mm, span(s.at_interval_mm)),
@@ -173,6 +174,12 @@ fn stenosis(body: &mut String, s: &StenosisRow) {
         format!("{:.1} mm²<span class='words'>{}</span>", s.reference_area_mm2, escape(&s.reference)),
     ];
     row(body, &s.name, &LESION, &cells);
+}
+
+/// That its narrowest place may not have been seen.
+fn caution(s: &StenosisRow) -> String {
+    s.may_be_narrower_because()
+        .map_or_else(String::new, |why| format!("<span class='span'>may be narrower: {why}</span>"))
 }
 
 fn or_not_named(text: &str) -> &str {
@@ -343,6 +350,25 @@ mod tests {
     fn the_page_names_no_address_outside_itself() {
         let page = page(&Report::default(), &Pictures::default());
         assert!(!page.contains("http"), "{page}");
+    }
+
+    #[test]
+    fn a_lesion_that_was_not_seen_whole_is_said_to_be_possibly_narrower() {
+        let said = |may_be_narrower: bool, unseen_mm: f64| {
+            let stenosis =
+                StenosisRow { name: "S1".into(), may_be_narrower, unseen_mm, ..StenosisRow::default() };
+            let report =
+                Report { report: "report.html".into(), stenoses: vec![stenosis], ..Report::default() };
+            (page(&report, &Pictures::default()), report.to_string())
+        };
+        let (page, text) = said(true, 2.5);
+        // In the verdict and in the table.
+        assert_eq!(page.matches("may be narrower: 2.5 mm of it no image shows").count(), 2, "{page}");
+        assert!(text.contains("S1   may be narrower: 2.5 mm of it no image shows"), "{text}");
+        let (page, text) = said(true, 0.0);
+        assert!(page.contains("narrowest where the scan ends") && text.contains("where the scan ends"));
+        let (page, text) = said(false, 0.0);
+        assert!(!page.contains("may be narrower") && !text.contains("may be narrower"));
     }
 
     #[test]

@@ -65,6 +65,11 @@ impl Report {
                 s.reference_area_mm2
             )?;
         }
+        for s in &self.stenoses {
+            if let Some(why) = s.may_be_narrower_because() {
+                writeln!(f, "{:<4} may be narrower: {why}", s.name)?;
+            }
+        }
         Ok(())
     }
 

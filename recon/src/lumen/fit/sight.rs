@@ -17,8 +17,6 @@ pub(super) struct Sight {
     pub(super) trust: [f32; BINS],
     /// Part of the circumference where it is seen, of what can be seen of it.
     pub(super) walled: f64,
-    /// Whether a shadow, or the picture's edge, hides some of it.
-    pub(super) shaded: bool,
     /// How far outward of `inside` it rises to half its brightness (m), where it is seen.
     rise: [Option<f32>; SECTORS],
 }
@@ -45,7 +43,6 @@ impl Sight {
             } else {
                 seen as f64 / SECTORS as f64
             },
-            shaded: shown < SECTORS,
             rise: std::array::from_fn(rise),
         }
     }
