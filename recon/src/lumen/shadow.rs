@@ -1,5 +1,6 @@
-//! Shadows: columns of the picture under which next to nothing echoes, because plaque, bone, gas or lost contact keeps the
-//! sound away. What lies in one is neither lumen nor wall; it is not asked.
+//! Shadows: columns of the picture under which less echoes than elsewhere, because plaque, bone, gas or lost contact keeps
+//! the sound away. What lies in one is neither lumen nor wall. Where enough comes back all the way from above the lumen
+//! down, it is made as bright as the rest; elsewhere it is not asked.
 
 use probepath_us_capture::BScan;
 
@@ -17,93 +18,153 @@ const LEAST_BANDS: usize = 3;
 /// How far beside a shadow's edge the beam still meets it, in full widths: the picture is darker there by more than a
 /// tenth.
 const BESIDE: f64 = 0.6;
+/// A shadow that is to be made up for begins at least this far above the lumen's middle (m), leaves this part of the power,
+/// and this many times what black stands for.
+const ABOVE_M: f64 = 7e-3;
+const LEAST_GAIN: f32 = 0.003;
+const OVER_BLACK: f32 = 10.0;
+/// Bands in order of brightness: what a column loses is that of this part of them, because the lumen darkens some.
+const TYPICAL: f64 = 0.65;
 /// Pixels that are asked: one in so many along x and y.
 const STEP: (usize, usize) = (2, 3);
 
-/// Which columns of a picture are in a shadow at some depth.
+/// What shadows do to the columns of a picture round some depth.
 #[derive(Clone, Debug)]
 pub(crate) struct Shadows {
     step_m: f64,
-    dark: Vec<bool>,
+    /// What is left of each column's power; zero where nothing can be said.
+    gains: Vec<f32>,
 }
 
 impl Shadows {
-    /// From the picture below a depth in it (m), where the beam is this wide (full width, m).
+    /// From the picture round a depth in it (m), where the beam is this wide (full width, m).
     pub(crate) fn below(bscan: &BScan, table: &PowerOfGrey, depth_m: f64, width_m: f64) -> Self {
         let spacing = bscan.setting.spacing;
         let step_m = spacing.x_m * STEP.0 as f64;
         let first = (depth_m / spacing.y_m).clamp(0.0, bscan.height() as f64) as usize;
-        let band = ((BAND_M / spacing.y_m).round() as usize).max(STEP.1);
-        let rows: Vec<&[u8]> = bscan.pixels().chunks_exact(bscan.width()).skip(first).collect();
-        let bands: Vec<Vec<bool>> = rows
-            .chunks_exact(band)
-            .map(|rows| darker_columns(rows, table, (ACROSS_M / step_m / 2.0).round() as usize))
-            .collect();
+        let height = ((BAND_M / spacing.y_m).round() as usize).max(STEP.1);
+        let half = (ACROSS_M / step_m / 2.0).round() as usize;
+        let rows: Vec<&[u8]> = bscan.pixels().chunks_exact(bscan.width()).collect();
+        let (above, below) = rows.split_at(first.min(rows.len()));
+        let below: Vec<Band> =
+            below.chunks_exact(height).filter_map(|rows| Band::of(rows, table, half)).collect();
         let columns = bscan.width().div_ceil(STEP.0);
-        if bands.len() < LEAST_BANDS {
-            return Self { step_m, dark: vec![false; columns] };
+        let mut shadows = Self { step_m, gains: vec![1.0; columns] };
+        let core: Vec<bool> = (0..columns).map(|column| dark(&below, column)).collect();
+        if below.len() < LEAST_BANDS || !core.contains(&true) {
+            return shadows;
         }
-        let needed = (BANDS_DARK * bands.len() as f64).ceil() as usize;
-        let dark = |column: usize| bands.iter().filter(|band| band[column]).count() >= needed;
-        let core: Vec<bool> = (0..columns).map(dark).collect();
+        let most = (ABOVE_M / BAND_M).ceil() as usize;
+        let above = above.rchunks_exact(height).take(most).filter_map(|rows| Band::of(rows, table, half));
         let beside = (BESIDE * width_m / step_m).round() as usize;
-        let near = |column: usize| {
-            core[column.saturating_sub(beside)..(column + beside + 1).min(columns)].contains(&true)
-        };
-        Self { step_m, dark: (0..columns).map(near).collect() }
+        shadows.fall(&core, beside, &below, &above.collect::<Vec<_>>(), OVER_BLACK * table.single(0));
+        shadows
     }
 
-    /// Whether a place lies in a shadow (m along x, from the middle of the first column).
-    pub(crate) fn cover(&self, x_m: f64) -> bool {
+    /// Each shadow, with what lies `beside` its core.
+    fn fall(&mut self, core: &[bool], beside: usize, below: &[Band], above: &[Band], least: f32) {
+        let mut from = 0;
+        while let Some(start) = core.iter().skip(from).position(|core| *core).map(|at| from + at) {
+            // Cores whose surroundings meet are one shadow.
+            let mut end = start + 1;
+            while let Some(next) = core.iter().take(end + 2 * beside + 1).rposition(|core| *core)
+                && next >= end
+            {
+                end = next + 1;
+            }
+            let shadow = start.saturating_sub(beside)..(end + beside).min(core.len());
+            let gains: Vec<f32> = shadow.clone().map(|column| gain(column, below, above)).collect();
+            // At its edges less is lost.
+            let whole = 2 * (start..end).filter(|column| dark(above, *column)).count() > end - start;
+            let shows = gains.iter().all(|gain| *gain > LEAST_GAIN)
+                && (start..end).all(|column| typical(below, above, |band| band.power[column]) > least);
+            for (column, gain) in shadow.zip(gains) {
+                self.gains[column] = if whole && shows { gain } else { 0.0 };
+            }
+            from = end;
+        }
+    }
+
+    /// What is left of the power at a place (m along x, from the middle of the first column); zero where nothing can be
+    /// said.
+    pub(crate) fn gain(&self, x_m: f64) -> f32 {
         let column = (x_m / self.step_m).round();
-        column >= 0.0 && self.dark.get(column as usize).copied().unwrap_or(false)
+        if column >= 0.0 { self.gains.get(column as usize).copied().unwrap_or(1.0) } else { 1.0 }
     }
 
-    /// Makes what is in a shadow as bright as the rest is on the mean: no front runs there.
+    /// Whether nothing can be said of a place.
+    pub(crate) fn cover(&self, x_m: f64) -> bool {
+        self.gain(x_m) <= 0.0
+    }
+
+    /// Makes up for what is lost, and what nothing can be said of as bright as the rest is on the mean: no front runs there.
     pub(crate) fn fill(&self, patch: &mut Patch) {
-        if !self.dark.contains(&true) {
+        let gains: Vec<f32> = (0..patch.columns).map(|column| self.gain(patch.place(column).0)).collect();
+        if gains.iter().all(|gain| *gain >= 1.0) {
             return;
         }
-        let covered: Vec<bool> = (0..patch.columns).map(|column| self.cover(patch.place(column).0)).collect();
-        let seen = |cell: usize| !covered[cell % patch.columns];
+        let columns = patch.columns;
         let (mut sum, mut count) = (0.0_f32, 0.0_f32);
-        for (_, power) in patch.power.iter().enumerate().filter(|(cell, _)| seen(*cell)) {
-            (sum, count) = (sum + power, count + 1.0);
+        for (cell, power) in
+            patch.power.iter_mut().enumerate().filter(|(cell, _)| gains[cell % columns] > 0.0)
+        {
+            *power /= gains[cell % columns];
+            (sum, count) = (sum + *power, count + 1.0);
         }
         let mean = sum / count.max(1.0);
-        let columns = patch.columns;
-        for (cell, power) in patch.power.iter_mut().enumerate() {
-            if covered[cell % columns] {
-                *power = mean;
-            }
-        }
+        let hidden = patch.power.iter_mut().enumerate().filter(|(cell, _)| gains[cell % columns] <= 0.0);
+        hidden.for_each(|(_, power)| *power = mean);
     }
 }
 
-/// Of every second column of a few rows: whether it is darker than most.
-fn darker_columns(rows: &[&[u8]], table: &PowerOfGrey, half: usize) -> Vec<bool> {
-    let columns = rows.first().map_or(0, |row| row.len().div_ceil(STEP.0));
-    let mut power = vec![0.0_f32; columns];
-    for row in rows.iter().step_by(STEP.1) {
-        let pixels = row.iter().step_by(STEP.0);
-        power.iter_mut().zip(pixels).for_each(|(sum, &grey)| *sum += table.single(grey));
+/// Mean power of every second column of a few rows, averaged over columns beside it, and what is usual there.
+struct Band {
+    power: Vec<f32>,
+    usual: f32,
+}
+
+impl Band {
+    fn of(rows: &[&[u8]], table: &PowerOfGrey, half: usize) -> Option<Self> {
+        let columns = rows.first().map_or(0, |row| row.len().div_ceil(STEP.0));
+        let mut power = vec![0.0_f32; columns];
+        for row in rows.iter().step_by(STEP.1) {
+            let pixels = row.iter().step_by(STEP.0);
+            power.iter_mut().zip(pixels).for_each(|(sum, &grey)| *sum += table.single(grey));
+        }
+        let count = rows.len().div_ceil(STEP.1) as f32;
+        let mut sums = vec![0.0_f32; columns + 1];
+        for (column, power) in power.iter().enumerate() {
+            sums[column + 1] = sums[column] + power / count;
+        }
+        let across = |column: usize| {
+            let (from, to) = (column.saturating_sub(half), (column + half + 1).min(columns));
+            (sums[to] - sums[from]) / (to - from) as f32
+        };
+        let power: Vec<f32> = (0..columns).map(across).collect();
+        let mut sorted = power.clone();
+        let middle = columns / 2;
+        let usual = (middle < columns).then(|| *sorted.select_nth_unstable_by(middle, f32::total_cmp).1)?;
+        Some(Self { power, usual })
     }
-    let mut sums = vec![0.0_f32; columns + 1];
-    for (column, power) in power.iter().enumerate() {
-        sums[column + 1] = sums[column] + power;
-    }
-    let across = |column: usize| {
-        let (from, to) = (column.saturating_sub(half), (column + half + 1).min(columns));
-        (sums[to] - sums[from]) / (to - from) as f32
-    };
-    let means: Vec<f32> = (0..columns).map(across).collect();
-    let mut sorted = means.clone();
-    let middle = columns / 2;
-    if middle >= columns {
-        return Vec::new();
-    }
-    let usual = *sorted.select_nth_unstable_by(middle, f32::total_cmp).1;
-    means.iter().map(|mean| *mean < DARK * usual).collect()
+}
+
+/// Whether a column is darker than most in nearly every band.
+fn dark(bands: &[Band], column: usize) -> bool {
+    let needed = (BANDS_DARK * bands.len() as f64).ceil() as usize;
+    bands.iter().filter(|band| band.power[column] < DARK * band.usual).count() >= needed
+}
+
+/// What is left of a column's power, at most all.
+fn gain(column: usize, below: &[Band], above: &[Band]) -> f32 {
+    let part = |band: &Band| band.power[column] / band.usual.max(f32::MIN_POSITIVE);
+    typical(below, above, part).min(1.0)
+}
+
+/// What the bands typically have, where a lumen darkens some.
+fn typical(below: &[Band], above: &[Band], of: impl Fn(&Band) -> f32) -> f32 {
+    let mut each: Vec<f32> = below.iter().chain(above).map(of).collect();
+    each.sort_by(f32::total_cmp);
+    each.get((TYPICAL * each.len() as f64) as usize).copied().unwrap_or(1.0)
 }
 
 #[cfg(test)]
@@ -111,25 +172,56 @@ mod tests {
     use super::*;
     use crate::phantom_images::{Phantom, Shadow, Vein};
 
-    fn shadows(phantom: &Phantom) -> Vec<(f64, bool)> {
+    /// What is left at every millimetre across, of an image with its lumen's middle 15 mm down.
+    fn gains(phantom: &Phantom) -> Vec<(f64, f32)> {
         let image = phantom.bscan(0, 0.0);
         let shadows = Shadows::below(&image.bscan, &PowerOfGrey::new(60.0), 0.015, 1.7e-3);
-        (0..31).map(|mm| (f64::from(mm), shadows.cover(f64::from(mm) * 1e-3))).collect()
+        (0..31).map(|mm| (f64::from(mm), shadows.gain(f64::from(mm) * 1e-3))).collect()
+    }
+
+    /// A shadow from 2 to 6 mm right of the middle.
+    fn shadowed(seed: u64, below: f64, loss_db: f64) -> Phantom {
+        let shadow = Some(Shadow { across: (2.0, 6.0), below, loss_db });
+        Phantom { shadow, pixels: (320, 240), seed, ..Phantom::default() }
     }
 
     #[test]
     fn a_shadow_is_found_with_what_lies_beside_it_and_nothing_else_is() {
-        for (seed, loss_db) in [(171, 15.0), (172, 20.0), (173, 30.0)] {
-            let shadow = Some(Shadow { across: (2.0, 6.0), below: 22.0, loss_db });
-            let phantom = Phantom { shadow, pixels: (320, 240), seed, ..Phantom::default() };
+        for (seed, loss_db) in [(171, 15.0), (172, 20.0), (173, 30.0), (174, 50.0)] {
+            let phantom = shadowed(seed, 10.0, loss_db);
             let middle = 0.5 * phantom.window.1;
-            for (mm, covered) in shadows(&phantom) {
+            for (mm, gain) in gains(&phantom) {
                 let off = mm - middle;
                 let (inside, beside) = ((2.5..=5.5).contains(&off), (0.0..=8.0).contains(&off));
-                assert!(covered || !inside, "{seed}: {off} mm is in it");
-                assert!(!covered || beside, "{seed}: {off} mm is not");
+                assert!(gain < 0.5 || !inside, "{seed}: {off} mm is in it, {gain}");
+                assert!(gain >= 1.0 || beside, "{seed}: {off} mm is not, {gain}");
             }
         }
+    }
+
+    #[test]
+    fn what_a_shadow_takes_is_made_up_for_where_enough_comes_back() {
+        let (mut made_up, mut all) = (0, 0);
+        for seed in 190..220 {
+            let lost = |below: f64, loss_db: f64| -> f32 {
+                let phantom = shadowed(seed, below, loss_db);
+                let core = 0.5 * phantom.window.1 + 4.0;
+                gains(&phantom)
+                    .into_iter()
+                    .find(|(mm, _)| (mm - core).abs() < 0.6)
+                    .map_or(1.0, |(_, gain)| gain)
+            };
+            for loss_db in [15.0_f32, 20.0] {
+                let gain = lost(10.0, f64::from(loss_db));
+                // The beam brings in some echoes from beside the shadow.
+                let right = (-4.0..5.0).contains(&(10.0 * gain.log10() + loss_db));
+                assert!(right || gain <= 0.0, "{seed}: {loss_db} dB, {gain}");
+                (made_up, all) = (made_up + usize::from(right), all + 1);
+            }
+            // Too little comes back, or the shadow begins at the lumen.
+            assert!(lost(10.0, 50.0) <= 0.0 && lost(28.0, 20.0) <= 0.0, "{seed}");
+        }
+        assert!(10 * made_up >= 9 * all, "{made_up} of {all}");
     }
 
     #[test]
@@ -144,8 +236,8 @@ mod tests {
         ];
         for phantom in &phantoms {
             for seed in 180..190 {
-                let covered = shadows(&Phantom { seed, ..phantom.clone() });
-                assert!(covered.iter().all(|(_, covered)| !covered), "{seed}: {covered:?}");
+                let gains = gains(&Phantom { seed, ..phantom.clone() });
+                assert!(gains.iter().all(|(_, gain)| *gain >= 1.0), "{seed}: {gains:?}");
             }
         }
     }

@@ -29,7 +29,7 @@ pub(super) struct Wanted<'a> {
     pub(super) centre: (f64, f64),
     pub(super) half: (f64, f64),
     pub(super) cell: (f64, f64),
-    /// What is not looked at.
+    /// What hides some of it.
     pub(super) shadows: &'a Shadows,
 }
 
@@ -86,14 +86,21 @@ impl Lattice {
         lattice.place(x.first, y.first);
         lattice.look(bscan, table, &x, &y)?;
         let (first, step) = (wanted.centre.0 + x.first, lattice.cell.0);
-        lattice.leave_out(|column| wanted.shadows.cover(first + column as f64 * step));
+        lattice.out_of_shadows(|column| wanted.shadows.gain(first + column as f64 * step));
         Some(lattice)
     }
 
-    /// Does not look at some columns.
-    fn leave_out(&mut self, hidden: impl Fn(usize) -> bool) {
-        for column in (0..self.columns).filter(|column| hidden(*column)) {
-            self.used.iter_mut().skip(column).step_by(self.columns).for_each(|used| *used = 0.0);
+    /// Makes up for what columns have lost, and does not look at those that have lost all.
+    fn out_of_shadows(&mut self, gain: impl Fn(usize) -> f32) {
+        for column in 0..self.columns {
+            let gain = gain(column);
+            if gain >= 1.0 {
+                continue;
+            }
+            let cells = self.power.iter_mut().zip(&mut self.used).skip(column).step_by(self.columns);
+            for (power, used) in cells {
+                (*power, *used) = if gain > 0.0 { (*power / gain, *used) } else { (*power, 0.0) };
+            }
         }
     }
 
