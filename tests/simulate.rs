@@ -38,6 +38,23 @@ fn interrupt(child: Child) -> Output {
     child.wait_with_output().unwrap()
 }
 
+/// Waits for a package of the controller's state, which every tick sends to those who asked for it.
+fn wait_for_a_tick(host: &str) {
+    let mut rtde = TcpStream::connect((host, 30004)).unwrap();
+    // The protocol's version, the outputs that are wanted and how often, and the start (`UR_WIRE.md`).
+    rtde.write_all(&[0, 5, b'V', 0, 2]).unwrap();
+    rtde.write_all(&[&[0, 20, b'O'][..], &500_f64.to_be_bytes(), b"timestamp"].concat()).unwrap();
+    rtde.write_all(&[0, 3, b'S']).unwrap();
+    let mut kind = 0;
+    while kind != b'U' {
+        let mut header = [0; 3];
+        rtde.read_exact(&mut header).unwrap();
+        kind = header[2];
+        let mut rest = vec![0; usize::from(u16::from_be_bytes([header[0], header[1]])) - 3];
+        rtde.read_exact(&mut rest).unwrap();
+    }
+}
+
 #[test]
 fn it_says_what_it_serves_and_serves_it_until_ctrl_c() {
     let host = host(0);
@@ -83,6 +100,7 @@ fn it_ends_with_its_standard_input_and_leaves_what_happened() {
     let arguments = ["simulate", "--json", "--host", &host, "--until-input-ends", "--report"];
     let mut child = probepath(&arguments).arg(&report).stdin(Stdio::piped()).spawn().unwrap();
     document(&mut child);
+    wait_for_a_tick(&host);
     drop(child.stdin.take());
     assert_eq!(child.wait_with_output().unwrap().status.code(), Some(0));
     let said: Value = serde_json::from_str(&std::fs::read_to_string(&report).unwrap()).unwrap();
