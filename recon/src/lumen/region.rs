@@ -30,7 +30,7 @@ pub(crate) struct Region {
     pub(crate) radii: Vec<f64>,
     /// Its area over the area inside `radii`: well above 1 where it runs on into a branch.
     pub(crate) excess: f64,
-    /// What hides the wall there.
+    /// What shadows do to the picture there.
     pub(crate) shadows: Shadows,
 }
 

@@ -1,5 +1,5 @@
 //! Shadows: columns of the picture under which less echoes than elsewhere, because plaque, bone, gas or lost contact keeps
-//! the sound away. What lies in one is neither lumen nor wall. Where enough comes back all the way from above the lumen
+//! the sound away. A shadow is as dark as a lumen and is none. Where enough comes back all the way from above the lumen
 //! down, it is made as bright as the rest; elsewhere it is not asked.
 
 use probepath_us_capture::BScan;
@@ -18,8 +18,8 @@ const LEAST_BANDS: usize = 3;
 /// How far beside a shadow's edge the beam still meets it, in full widths: the picture is darker there by more than a
 /// tenth.
 const BESIDE: f64 = 0.6;
-/// A shadow that is to be made up for begins at least this far above the lumen's middle (m), leaves this part of the power,
-/// and this many times what black stands for.
+/// A shadow that is to be made up for begins at least this far above the lumen's middle (m) or runs up to the picture's edge,
+/// and leaves this part of the power and this many times what black stands for.
 const ABOVE_M: f64 = 7e-3;
 const LEAST_GAIN: f32 = 0.003;
 const OVER_BLACK: f32 = 10.0;
